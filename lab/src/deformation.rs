@@ -32,6 +32,7 @@ pub fn run(words: &Words) -> Outcome {
     let first: u64 = words.number("first=").unwrap_or(1);
     let size = words.after("size=").unwrap_or("4x3");
     let size: Vec<f64> = size.split('x').map(|s| s.parse().unwrap()).collect();
+
     let numbers = |prefix: &str, default: &str| -> Vec<f64> {
         words
             .list(prefix, default)
@@ -39,6 +40,7 @@ pub fn run(words: &Words) -> Outcome {
             .map(|w| w.parse().unwrap())
             .collect()
     };
+
     let toward = words.list("toward=", "out");
     let table = Table::begin([
         "survey",
@@ -56,6 +58,7 @@ pub fn run(words: &Words) -> Outcome {
         "in face 1 m",
         "s",
     ]);
+
     for sensor in words.chosen(&["tls", "uav"]) {
         for &depth_mm in &numbers("depth=", "0") {
             let diameters = if depth_mm == 0.0 {
@@ -84,6 +87,7 @@ pub fn run(words: &Words) -> Outcome {
             }
         }
     }
+
     Ok(())
 }
 
@@ -130,6 +134,7 @@ impl Case {
             d_m: direction.map(|d| d * self.depth_m),
             diameter_m: self.across_m,
         };
+
         SceneParams {
             wall,
             motions: if self.depth_m > 0.0 {
@@ -162,6 +167,7 @@ impl Case {
         let (seen_ids, stones): (Vec<StoneId>, Vec<SeenStone>) = seen.into_iter().unzip();
         let truth = |id: StoneId, k: usize| wall.truth(id, stones[k].centroid);
         let number = |id: StoneId| seen_ids.iter().position(|s| *s == id).unwrap();
+
         let stone = |s: &stonewise_core::registration::StoneDeformation| {
             let k = number(s.stone);
             let frame = stonewise_core::geometry::FaceFrame::from_normal(&stones[k].normal).face_from_world();
@@ -169,6 +175,7 @@ impl Case {
             let spread = frame * s.covariance * frame.transpose();
             [error, spread.diagonal().map(f64::sqrt)]
         };
+
         let [along_m, up_m] = self.middle();
         let apart = |k: &usize| (stones[*k].centroid.y - along_m).hypot(stones[*k].centroid.z - up_m);
         let nearest = (0..stones.len())
@@ -183,6 +190,7 @@ impl Case {
             let zone: BTreeSet<StoneId> = zone.stones.iter().copied().collect();
             zone.intersection(&moved).count() as f64 / zone.union(&moved).count().max(1) as f64
         });
+
         Wall {
             is_claimed: found.is_shown(),
             stones: found.stones.iter().map(stone).collect(),
@@ -201,10 +209,12 @@ fn cells(label: &str, walls: &[Wall], seconds: f64) -> Vec<String> {
             100.0 * walls.iter().filter(|w| holds(w)).count() as f64 / count
         )
     };
+
     let stones: Vec<&[Vector3<f64>; 2]> = walls.iter().flat_map(|w| &w.stones).collect();
     let held = |axis: usize| coverage(&stones, axis);
     let of_axes = |part: usize| rms_of_axes(&stones, part);
     let overlaps: Vec<f64> = walls.iter().filter_map(|w| w.overlap).collect();
+
     let limit = |of: &dyn Fn(&Wall) -> Option<f64>| {
         let known: Vec<f64> = walls.iter().filter_map(of).collect();
         format!(
@@ -212,6 +222,7 @@ fn cells(label: &str, walls: &[Wall], seconds: f64) -> Vec<String> {
             1e3 * known.iter().sum::<f64>() / known.len().max(1) as f64
         )
     };
+
     vec![
         label.to_owned(),
         walls.len().to_string(),

@@ -193,6 +193,7 @@ impl Wall {
         let side = crop_side_px(stones, 160.0);
         let points = (400_000 / stones.max(1)).clamp(40, 160);
         let mut sections = Vec::new();
+
         for i in 0..stones {
             let d = self.motion(self.place(i), i);
             for (later, cut) in [
@@ -220,6 +221,7 @@ impl Wall {
                 }));
             }
         }
+
         write_sections(dir, 2, &sections)?;
         write_tracks(dir, 2, &self.tracks(stones))?;
         for epoch in [1, 2] {
@@ -228,6 +230,7 @@ impl Wall {
             write_thin_cloud(dir, epoch, &self.thin_cloud(epoch))?;
             write_cameras(dir, epoch, &self.cameras())?;
         }
+
         Ok(())
     }
 
@@ -238,6 +241,7 @@ impl Wall {
             shift_m: at,
             covariance_m2: [sd * sd, 0.3 * sd * sd, 1.5 * sd * sd],
         };
+
         let evidence = |i: usize| {
             let d = self.motion(self.place(i), i);
             let photo = |k: usize| {
@@ -259,6 +263,7 @@ impl Wall {
                 pictures: (i < most_pictured(side)).then(|| pictures(i, side as usize)),
             }
         };
+
         Tracks {
             photos: (0..12).map(|k| format!("<script>{k}.jpg")).collect(),
             stones: (0..stones)
@@ -285,6 +290,7 @@ impl Wall {
             };
             [0, 6, 18].map(|tint| (base - tint + grain).clamp(0, 255) as u8)
         });
+
         let corner = |x: f64, y: f64| [x as f32, y as f32];
         let ring = vec![
             corner(left, top),
@@ -368,6 +374,7 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
         photos: 12,
         stones: 200,
     };
+
     let datum = match case {
         "unknown" => Datum::unknown(&Point3::origin(), "unknown"),
         _ => Datum::known(
@@ -416,6 +423,7 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
             doubt: false,
         }],
     };
+
     let gicp = GicpRecord {
         stones: 200,
         measured: 190,
@@ -431,6 +439,7 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
         observers: None,
         deformation: None,
     };
+
     std::fs::write(dir.join(RUN), serde_json::to_string(&run)?)?;
     std::fs::write(
         dir.join(PairFile::Registration.name(1)),

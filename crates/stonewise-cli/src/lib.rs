@@ -48,11 +48,13 @@ pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> u8 {
         }
     };
     let printer = printer::Printer::new(args.quiet);
+
     let outcome = commands::dispatch(args, &printer);
     match &outcome {
         Ok(_) => printer.finish(),
         Err(_) => printer.abandon(),
     }
+
     match outcome {
         Ok(commands::Outcome::Done) => DONE,
         Ok(commands::Outcome::InDoubt) => IN_DOUBT,

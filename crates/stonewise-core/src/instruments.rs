@@ -98,6 +98,7 @@ pub fn agreement(
             0.0
         }
     });
+
     let values = DVector::from_fn(count, |row, _| observed[row].2);
     let by_error = &design * DMatrix::from_fn(6, 6, |r, c| prior[(r, c)]);
     let covariance = &by_error * design.transpose() + own;
@@ -112,6 +113,7 @@ pub fn agreement(
         Some(_) => 0,
         None => shown(&prior, &error.covariance)?,
     };
+
     let square = values.dot(&weighted);
     let rows_of = |i: usize| -> Vec<usize> { (0..count).filter(|&row| observed[row].0 == i).collect() };
     let tested = |i: usize| {
@@ -148,6 +150,7 @@ pub fn agreement(
         of.p = square.and_then(|square| tail(square, rows.len()));
         of
     };
+
     Some(Agreement {
         instruments: (0..differences.len()).map(tested).collect(),
         p: tail(square, count.saturating_sub(shown)),

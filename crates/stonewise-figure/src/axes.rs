@@ -46,6 +46,7 @@ impl Axes {
             out,
             r#"<rect class="ground" x="{left}" y="{top}" width="{width:.1}" height="{height:.1}"/>"#
         );
+
         for (tick, label) in self.x.ticks((width / 70.0) as usize) {
             let x = self.px(tick);
             let _ = write!(
@@ -54,6 +55,7 @@ impl Axes {
                 bottom + 15.0
             );
         }
+
         for (tick, label) in self.y.ticks(((height / 38.0) as usize).max(2)) {
             let y = self.py(tick);
             let _ = write!(
@@ -63,6 +65,7 @@ impl Axes {
                 y + 4.0
             );
         }
+
         let (middle_x, middle_y) = (left + width / 2.0, top + height / 2.0);
         let _ = write!(
             out,
@@ -70,6 +73,7 @@ impl Axes {
             bottom + 32.0,
             escape(&self.x.label)
         );
+
         let _ = write!(
             out,
             r#"<text class="label" transform="translate(12 {middle_y:.1})rotate(-90)" text-anchor="middle">{}</text>"#,

@@ -16,10 +16,12 @@ pub fn colour_bar(out: &mut String, [left, top, height]: [f64; 3], colours: &[Rg
             each + 0.5
         );
     }
+
     let _ = write!(
         out,
         r#"<path class="frame" d="M{left:.1} {top:.1}h12v{height:.1}h-12z"/>"#
     );
+
     for (tick, label) in axis.ticks(((height / 30.0) as usize).max(2)) {
         let y = top + height * (1.0 - axis.share(tick));
         let _ = write!(
@@ -30,6 +32,7 @@ pub fn colour_bar(out: &mut String, [left, top, height]: [f64; 3], colours: &[Rg
             y + 4.0
         );
     }
+
     let _ = write!(
         out,
         r#"<text class="label" x="{left:.1}" y="{:.1}">{}</text>"#,

@@ -192,6 +192,7 @@ fn draw(axes: &Axes, out: &mut String, item: &Item) {
         let (x, y) = (axes.px(p[0]), axes.py(p[1]));
         (x.is_finite() && y.is_finite()).then_some((x, y))
     };
+
     match item {
         Item::Line {
             points,

@@ -42,6 +42,7 @@ pub fn read_exif(path: &Path) -> Option<Exif> {
     let below = |tag: u16| main.iter().find(|e| e.tag == tag);
     let own = below(0x8769).map(|e| e.place).and_then(|p| tiff.number(p, 4));
     let own = own.map_or(Vec::new(), |place| tiff.entries(place));
+
     let gps = below(0x8825).map(|e| e.place).and_then(|p| tiff.number(p, 4));
     let gps = gps.map_or(Vec::new(), |place| tiff.entries(place));
     let (make, model) = (tiff.text(&main, 0x010f), tiff.text(&main, 0x0110));
@@ -52,12 +53,14 @@ pub fn read_exif(path: &Path) -> Option<Exif> {
         (make, model) => make.or(model),
     };
     let taken = tiff.text(&own, 0x9003).or_else(|| tiff.text(&main, 0x0132));
+
     let place = |tiff: &mut Tiff, tag: u16, negative: &str, most: f64| {
         let [degrees, minutes, seconds] = tiff.ratios(&gps, tag)?;
         let size = degrees + minutes / 60.0 + seconds / 3600.0;
         let sign = tiff.text(&gps, tag - 1)?;
         (size <= most).then_some(if sign == negative { -size } else { size })
     };
+
     let latitude = place(&mut tiff, 2, "S", 90.0);
     let longitude = place(&mut tiff, 4, "W", 180.0);
     let is_below = tiff.byte(&gps, 5) == Some(1);

@@ -44,11 +44,13 @@ impl DatedCsv {
             let message = "the first line must name the columns, separated by commas, one of them `date`";
             return Err(file.error(1, message));
         };
+
         let head = &file.head;
         if let Some(twin) = (1..head.len()).find(|&i| head[..i].contains(&head[i])) {
             let message = format!("two columns are named {:?}: rename one", head[twin]);
             return Err(file.error(1, message));
         }
+
         for (line, text) in lines.filter(|(_, line)| !line.trim().is_empty()) {
             let cells = cells(text);
             if cells.len() != file.head.len() {
@@ -71,6 +73,7 @@ impl DatedCsv {
                 cells,
             });
         }
+
         Ok(file)
     }
 

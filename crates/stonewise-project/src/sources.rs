@@ -141,11 +141,13 @@ impl EpochSources {
             return Self::as_one(raw, raw.len());
         }
         let mut of_raw: Vec<usize> = (0..raw.len()).collect();
+
         for k in 0..raw.len() {
             if let Some(j) = (0..k).find(|&j| is_same_pass(&raw[j], &raw[k])) {
                 of_raw[k] = of_raw[j];
             }
         }
+
         let mut heads: Vec<usize> = of_raw.clone();
         heads.sort_unstable();
         heads.dedup();
@@ -160,6 +162,7 @@ impl EpochSources {
                 has_times: source.range_s.is_some_and(|[low, high]| high - low > 1e-3),
             }
         });
+
         let index = |head: usize| heads.binary_search(&head).unwrap_or(0);
         Self {
             list: list.collect(),

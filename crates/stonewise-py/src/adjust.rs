@@ -207,12 +207,14 @@ fn relative_errors(
         has_times: false,
         same_as: None,
     });
+
     let sight = |source, stone: &Stone| SourcePoints {
         source,
         count: 1,
         time_s: 0.0,
         points: Cloud::new(stone.centroid, Vec::new()),
     };
+
     let seen: Vec<SeenStone> = stones
         .iter()
         .map(|stone| SeenStone {
@@ -239,6 +241,7 @@ fn rows(
     let outcomes: BTreeMap<StoneId, MatchOutcome> = matched.outcomes.iter().copied().collect();
     let motions: BTreeMap<StoneId, &PairResult> = results.iter().map(|r| (r.first, r)).collect();
     let common = common_motion(&first.stones, &motions);
+
     let row = |stone: &Stone| {
         let outcome = outcomes.get(&stone.id)?;
         let partner = match outcome {
@@ -257,6 +260,7 @@ fn rows(
             &Point2::origin(),
         ))
     };
+
     first.stones.iter().filter_map(row).collect()
 }
 

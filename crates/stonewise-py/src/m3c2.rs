@@ -54,6 +54,7 @@ pub fn m3c2<'py>(
     let core = points(&core_points)?;
     let given = normals.as_ref().map(vectors).transpose()?;
     let viewpoints = viewpoints.as_ref().map(points).transpose()?;
+
     let found = attended(py, &Listeners::progress(progress), |progress| {
         let normals = match (&given, &viewpoints) {
             (Some(normals), _) => CoreNormals::Given(normals),
@@ -71,6 +72,7 @@ pub fn m3c2<'py>(
         let counts: Vec<u32> = found.iter().map(|p| p.counts[epoch]).collect();
         counts.into_pyarray(py)
     };
+
     let normals: Vec<Vector3<f64>> = found.iter().map(|p| p.normal).collect();
     Ok((
         column(|p| p.distance_m),

@@ -32,6 +32,7 @@ pub fn transfer<'py>(
         let message = format!("{} views and {} label images", views.len(), labels.len());
         return Err(error(message));
     }
+
     let settings = Settings::default()
         .with_parameters(&parameters_of(parameters)?)
         .map_err(explained)?;
@@ -60,6 +61,7 @@ pub fn transfer<'py>(
         }
         Ok::<_, stonewise::Error>((stones, shares))
     })?;
+
     let (stones, shares) = found.map_err(explained)?;
     Ok((stones.into_pyarray(py), shares.into_pyarray(py)))
 }

@@ -37,11 +37,13 @@ impl View {
         let given = Matrix3::from_fn(|row, column| rotation[row][column]);
         let is_rotation =
             (given * given.transpose() - Matrix3::identity()).norm() < 1e-6 && given.determinant() > 0.0;
+
         if !is_rotation {
             return Err(error(
                 "rotation must be a rotation matrix, from world axes to those of the camera",
             ));
         }
+
         if width == 0 || height == 0 || !(focal_px.is_finite() && focal_px > 0.0) {
             return Err(error("width, height and focal_px must be positive"));
         }
@@ -54,6 +56,7 @@ impl View {
         camera.distortion = Distortion::brown(radial, [0.0; 3], tangential);
         let turn = UnitQuaternion::from_matrix(&given);
         let shift = Translation3::from(-(turn * centre));
+
         Ok(Self(geometry::View {
             image: ImageId(0),
             name,

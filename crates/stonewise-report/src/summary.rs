@@ -47,6 +47,7 @@ impl<'a> Summary<'a> {
         let verdict = verdict(results);
         let judged: BTreeMap<u32, &StoneVerdict> = verdict.stones.iter().map(|s| (s.stone_id, s)).collect();
         let has_moved = |s: &StoneRow| judged.get(&s.stone_id).is_some_and(|j| j.moved);
+
         let pick = |keep: &dyn Fn(&StoneRow, &RowMotion) -> bool, size: fn(&RowMotion) -> f64| {
             let mut all: Vec<_> = measured.iter().copied().filter(|(s, m)| keep(s, m)).collect();
             all.sort_by(|a, b| {
@@ -56,6 +57,7 @@ impl<'a> Summary<'a> {
             });
             all
         };
+
         let moved = pick(&|s, _| has_moved(s), |m| m.displacement.norm());
         let loose = pick(&|_, m| m.loose, |m| m.relative.norm());
         let of_status = |status| {
@@ -65,6 +67,7 @@ impl<'a> Summary<'a> {
                 .filter(|s| s.status == status)
                 .collect::<Vec<_>>()
         };
+
         Self {
             stones: results.stones.len(),
             by_status: Status::ALL

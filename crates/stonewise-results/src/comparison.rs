@@ -25,6 +25,7 @@ pub fn compare(results: &ResultSet) -> Comparison {
             squares.add(i, &low, &high);
         }
     }
+
     let mut on_stone: Vec<Vec<f64>> = vec![Vec::new(); rings.len()];
     let mut in_plane = Vec::new();
     for point in &results.distances {
@@ -40,6 +41,7 @@ pub fn compare(results: &ResultSet) -> Comparison {
             in_plane.push([d.dot(&frame.along), d.dot(&frame.up)]);
         }
     }
+
     Comparison {
         on_stone: on_stone.into_iter().map(|d| Sorted::new(d).median()).collect(),
         in_plane,

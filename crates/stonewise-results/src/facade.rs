@@ -201,6 +201,7 @@ fn stretches(
     along.sort_by(|a, b| a.0.total_cmp(&b.0));
     let count = (along.len() / MIN_STONES_PER_STRETCH).clamp(1, MAX_STRETCHES);
     let mut all: Vec<Stretch> = Vec::with_capacity(count);
+
     for i in 0..count {
         let part = &along[i * along.len() / count..(i + 1) * along.len() / count];
         let chord_m = part.iter().map(|p| p.0).sum::<f64>() / part.len().max(1) as f64;
@@ -220,6 +221,7 @@ fn stretches(
             turn_rad,
         });
     }
+
     all
 }
 

@@ -110,6 +110,7 @@ fn joint(results: &ResultSet, stones: [usize; 2], contacts: &[Contact]) -> Optio
         .map(|d| d * d.transpose())
         .sum::<nalgebra::Matrix2<f64>>();
     let eigen = spread.symmetric_eigen();
+
     let tangent: Vector2<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into();
     let gap: Vector2<f64> = contacts.iter().map(|c| c.gap).sum::<Vector2<f64>>() / n;
     let across = Vector2::new(-tangent.y, tangent.x);
@@ -121,6 +122,7 @@ fn joint(results: &ResultSet, stones: [usize; 2], contacts: &[Contact]) -> Optio
         return None;
     }
     let on_line = |c: &&Contact| Point2::from(mean + tangent * place(c));
+
     Some(Joint {
         stones,
         line: [on_line(first), on_line(last)],

@@ -117,12 +117,14 @@ pub fn read_outlines(dir: &Path) -> Result<BTreeMap<u32, StoneOutline>, Error> {
         message,
     };
     let file: File = serde_json::from_slice(&text).map_err(|e| content(e.to_string()))?;
+
     if file.format != FORMAT {
         return Err(content(format!(
             "outlines of format {}, this version reads {FORMAT}",
             file.format
         )));
     }
+
     let origin = Point3::from(file.origin);
     let outline = |e: Entry| {
         let ring = e.ring.into_iter().map(|p| origin + Vector3::from(p)).collect();
@@ -135,6 +137,7 @@ pub fn read_outlines(dir: &Path) -> Result<BTreeMap<u32, StoneOutline>, Error> {
             },
         )
     };
+
     Ok(file.stones.into_iter().map(outline).collect())
 }
 

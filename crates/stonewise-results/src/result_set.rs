@@ -117,6 +117,7 @@ impl ResultSet {
         let outlines = read_outlines(dir)?;
         let facade: Option<Facade> = read_json(&dir.join(FACADE))?;
         let core = read_distance_points(&dir.join(PairFile::M3c2Csv.name(pair)))?;
+
         Ok(Self {
             facade: facade
                 .unwrap_or_else(|| facade_of(stones.iter().map(|s| (s.stone_id, s.centroid)), &outlines)),

@@ -144,6 +144,7 @@ fn set_place(item: &mut Item, place: usize, rest: &[Step], value: &Json) -> Resu
     if place > list.len() {
         return Err(format!("there are only {} entries", list.len()));
     }
+
     match (rest, value) {
         ([], Json::Null) if place < list.len() => {
             list.remove(place);

@@ -103,6 +103,7 @@ fn around(wall: &Facade, places: impl Iterator<Item = Point3<f64>>, new: &NewSta
                 .to_owned(),
         )
     };
+
     let [first, second] = new.corners.map(Point2::from);
     let (low, high) = (first.inf(&second), first.sup(&second));
     let is_inside = |p: &Point3<f64>| {
@@ -117,6 +118,7 @@ fn around(wall: &Facade, places: impl Iterator<Item = Point3<f64>>, new: &NewSta
     let middle = *middle.ok_or_else(few)?;
     let frame = wall.frame_at(&middle);
     let surface = densest(inside, |p| (p - middle).dot(&frame.out));
+
     if surface.len() < LEAST_PLACES {
         return Err(few());
     }
@@ -128,6 +130,7 @@ fn around(wall: &Facade, places: impl Iterator<Item = Point3<f64>>, new: &NewSta
     let Some([bottom, top]) = span(surface.iter().map(|p| p.z)) else {
         return Err(few());
     };
+
     // Rounding must not leave a place outside.
     let (left, right) = (left - 1.0 / PER_METRE, right + 1.0 / PER_METRE);
     let (back, front) = (back - new.margin_m, front + new.margin_m);

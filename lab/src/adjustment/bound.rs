@@ -42,6 +42,7 @@ pub fn bounds(world: &World, epochs: &[Exact; 2], sigma_m: f64) -> BTreeMap<u32,
                 .vector,
         )
     };
+
     let mut rows: [Facets; 2] = Default::default();
     for (epoch, exact) in epochs.iter().enumerate() {
         let found: Vec<_> = exact
@@ -62,6 +63,7 @@ pub fn bounds(world: &World, epochs: &[Exact; 2], sigma_m: f64) -> BTreeMap<u32,
             rows[epoch].entry(stone).or_default().push((p, n, w));
         }
     }
+
     let stones: Vec<u32> = rows[0].keys().copied().collect();
     let information = |about: &Point3<f64>, members: &[u32], epoch: usize| -> Matrix6<f64> {
         let mut h = Matrix6::zeros();
@@ -73,6 +75,7 @@ pub fn bounds(world: &World, epochs: &[Exact; 2], sigma_m: f64) -> BTreeMap<u32,
         h.fill_upper_triangle_with_lower_triangle();
         h
     };
+
     stones
         .par_iter()
         .filter_map(|&stone| {

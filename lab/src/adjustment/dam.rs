@@ -44,6 +44,7 @@ pub fn build(case: Case, sensor: &str) -> Option<Trial> {
         across: Vector3::y(),
         at: 0.2,
     };
+
     let field = match case {
         Case::Translation => MotionField::translation(Vector3::new(0.0, 0.02, 0.05)).ok(),
         Case::Bulge => {
@@ -58,6 +59,7 @@ pub fn build(case: Case, sensor: &str) -> Option<Trial> {
         None => Vector3::zeros(),
     };
     let rows = read_stones(&folder.join("stones.csv"), &of_epochs);
+
     if !combo {
         // A crack runs along joints: a stone moves as one, what is no stone where it lies.
         for (id, points) in &mut second {
@@ -70,6 +72,7 @@ pub fn build(case: Case, sensor: &str) -> Option<Trial> {
                 .for_each(|p| *p += of_stone.unwrap_or_else(|| at(p)));
         }
     }
+
     let mut truth = BTreeMap::new();
     for (id, mut row) in rows {
         let Some(points) = first.get(&id) else { continue };
@@ -96,6 +99,7 @@ pub fn build(case: Case, sensor: &str) -> Option<Trial> {
         };
         truth.insert(id, of_stone);
     }
+
     Some(Trial {
         stones: [first, second],
         truth,

@@ -21,10 +21,12 @@ pub fn gicp(trial: &Trial, pairs: &MemoryPairs) -> Vec<PairResult> {
     });
     let mut next = 0;
     let mut start = std::collections::BTreeMap::new();
+
     for (id, points) in &trial.stones[0] {
         start.insert(*id, next);
         next += points.len() as u32;
     }
+
     let stones: Vec<GicpStone> = pairs
         .pairs()
         .iter()
@@ -40,6 +42,7 @@ pub fn gicp(trial: &Trial, pairs: &MemoryPairs) -> Vec<PairResult> {
             }
         })
         .collect();
+
     let results = align(&first, &second, &stones, &params);
     let mut placed: Vec<_> = stones.iter().map(|s| s.centroid).zip(results).collect();
     relate_to_neighbours(&mut placed, &params);

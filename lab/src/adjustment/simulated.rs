@@ -28,6 +28,7 @@ pub fn build(case: Case, sensor: &str, seed: u64, options: &Options) -> Trial {
         cells.shares(&truths)
     };
     let mut seen = shares(&first, 0);
+
     let (halves, exact) = if case.is_split() {
         let field = prescribed(case);
         let (one, two) = split(&first, seed);
@@ -71,6 +72,7 @@ pub fn build(case: Case, sensor: &str, seed: u64, options: &Options) -> Trial {
         }
         (epochs, exact)
     };
+
     let field = prescribed(case);
     let mut truth = BTreeMap::new();
     for ((t, motion), seen) in truths.iter().zip(&world.motions).zip(&seen) {
@@ -93,6 +95,7 @@ pub fn build(case: Case, sensor: &str, seed: u64, options: &Options) -> Trial {
             },
         );
     }
+
     let beam = params
         .tls
         .as_ref()
@@ -102,6 +105,7 @@ pub fn build(case: Case, sensor: &str, seed: u64, options: &Options) -> Trial {
         let sigma = beam.range_noise_m + beam.range_noise_per_m * (distance - 10.0).max(0.0);
         bound::bounds(&world, &exact, sigma)
     });
+
     Trial {
         stones: halves,
         truth,
@@ -130,6 +134,7 @@ fn params(case: Case, sensor: &str, options: &Options) -> SceneParams {
         depth_m: 0.05,
         diameter_m: 2.25,
     };
+
     let edge = WallMotion::Bulge {
         centre_m: [0.5 * width_m - 0.7, 0.8],
         depth_m: 0.02,
@@ -142,6 +147,7 @@ fn params(case: Case, sensor: &str, options: &Options) -> SceneParams {
         rotation_rad: 0.035,
     };
     let exact = options.exact;
+
     SceneParams {
         wall: WallParams::sized([width_m, options.height_m]),
         motions: match case {

@@ -175,15 +175,18 @@ pub fn draw(
     let shared = vector(shared_m);
     let mut shifts: Vec<Vector3<f64>> = (0..count).map(|_| vector(size_m)).collect();
     let turns: Vec<Vector3<f64>> = (0..count).map(|_| vector(0.1 * size_m)).collect();
+
     if kind == Kind::Adjusted {
         let mean = shifts.iter().sum::<Vector3<f64>>() / f64::from(count);
         shifts.fill(mean);
     }
+
     if kind == Kind::Uneven {
         shifts
             .iter_mut()
             .for_each(|s| *s = s.component_mul(&Vector3::new(2.0, 0.5, 1.0)));
     }
+
     let (scale, own) = (vector(1e-5), vector(1.0));
     let jitter: Vec<Vector3<f64>> = (0..count).map(|_| vector(0.3)).collect();
     // Half of a strip's variance changes along it.
@@ -206,6 +209,7 @@ pub fn draw(
         },
         seed,
     ));
+
     (0..count)
         .map(|k| {
             let spread = (f64::from(k) + 0.5) / f64::from(count) - 0.5;

@@ -20,6 +20,7 @@ fn params(case: &Case, seed: u64) -> SceneParams {
         spacing_m: 0.012,
         ..UavParams::default()
     };
+
     let tls = TlsParams {
         stations: case.sources,
         registration_m: 4e-4,
@@ -33,6 +34,7 @@ fn params(case: &Case, seed: u64) -> SceneParams {
         depth_m: 0.02,
         diameter_m: 1.5,
     };
+
     SceneParams {
         wall: WallParams::sized([3.0, 2.0]),
         motions: vec![bulge],

@@ -41,6 +41,7 @@ pub fn run(words: &Words) -> Outcome {
         sources: is_kept("sources"),
     };
     let table = begin(walls);
+
     for (sensor_name, sensor, usual) in sensors.into_iter().filter(|s| all_sensors || words.has(s.0)) {
         for stable in words.list("stable=", "none") {
             for sources in words.list("sources=", usual) {
@@ -65,6 +66,7 @@ pub fn run(words: &Words) -> Outcome {
             }
         }
     }
+
     Ok(())
 }
 

@@ -102,6 +102,7 @@ pub fn simulate(case: &Case, seed: u64) -> Survey {
     };
     let size = size_m(case.sensor, &mut rng);
     let stretches = stretches(case.kind, &mut of_its_own(seed));
+
     let mut of_epoch = |stretch| {
         draw(
             case.sensor,
@@ -113,10 +114,12 @@ pub fn simulate(case: &Case, seed: u64) -> Survey {
             rng.random(),
         )
     };
+
     let errors: Vec<SourceError> = stretches.into_iter().flat_map(&mut of_epoch).collect();
     let mut stones = Vec::new();
     let mut seeming = Vec::new();
     let (grid, width_m) = grid(case);
+
     for k in 0..grid[0] * grid[1] {
         let place = [
             ((k % grid[0]) as f64 + 0.5) / grid[0] as f64 * width_m - 0.5 * width_m,
@@ -126,6 +129,7 @@ pub fn simulate(case: &Case, seed: u64) -> Survey {
         stones.push(stone);
         seeming.push(error);
     }
+
     let [inside, across] = what.stone_m;
     let measured = seeming.iter().map(|e| {
         let own = Vector3::new(
@@ -135,6 +139,7 @@ pub fn simulate(case: &Case, seed: u64) -> Survey {
         );
         e + own
     });
+
     Survey {
         measured: measured.collect(),
         noise: vec![
@@ -211,6 +216,7 @@ fn stone(
                 points: Cloud::from_world(centroid, points.collect::<Vec<_>>()),
             }
         });
+
     let stone = SeenStone {
         centroid,
         normal: normal_of_face,
@@ -268,11 +274,13 @@ fn patches(stable: Stable, rng: &mut ChaCha8Rng) -> Vec<Patch> {
         outward: None,
         has_edges: false,
     };
+
     let side = |y: f64| Patch {
         outward: Some(Vector3::y() * y.signum()),
         ..patch(1, [0.7, y, 0.0], [0.8, 0.0, 0.0], [0.0, 0.0, 1.2], 0.0)
     };
     let ground = || patch(0, [0.6, -2.5, 0.0], [0.0, 5.0, 0.0], [1.5, 0.0, 0.0], 0.02);
+
     let small_building = || {
         vec![
             patch(1, [1.5, -0.6, 0.0], [0.0, 1.2, 0.0], [0.0, 0.0, 1.2], 0.0),
@@ -281,11 +289,13 @@ fn patches(stable: Stable, rng: &mut ChaCha8Rng) -> Vec<Patch> {
             side(0.6),
         ]
     };
+
     let with_building = || {
         let mut list = small_building();
         list.push(ground());
         list
     };
+
     match stable {
         Stable::None => Vec::new(),
         Stable::Ground => vec![ground()],
@@ -342,6 +352,7 @@ fn on_patch(
     let middle = patch.corner + 0.5 * (a + b);
     let view = error.sensor_for(&middle) - middle;
     let cosine = (normal_of_patch.dot(&view) / view.norm()).abs();
+
     // Faces turned away show nothing.
     if patch.outward.is_some_and(|outward| outward.dot(&view) <= 0.0) {
         return Vec::new();
@@ -351,6 +362,7 @@ fn on_patch(
         false => 0.0,
     };
     let count = (what.density * cross.norm() * cosine) as usize;
+
     (0..count)
         .map(|_| {
             let (u, v): (f64, f64) = (rng.random_range(0.0..1.0), rng.random_range(0.0..1.0));

@@ -16,6 +16,7 @@ pub fn run(words: &Words) -> Outcome {
     config.backbone.norm = Norm::FrozenBatch { epsilon: 1e-5 };
     let model = load_weights(MaskRcnn::zeros(&config)?, Path::new(weights))?.for_inference();
     let mut photos = Vec::new();
+
     for path in images {
         let image = read(Path::new(path))?;
         let megapixels = f64::from(image.width()) * f64::from(image.height()) * 1e-6;
@@ -39,6 +40,7 @@ pub fn run(words: &Words) -> Outcome {
         });
         photos.push(serde_json::Value::Array(objects.collect()));
     }
+
     std::fs::write(out, serde_json::to_vec(&photos)?)?;
     Ok(())
 }

@@ -63,6 +63,7 @@ pub fn run(words: &Words) -> Outcome {
         Some(other) => panic!("{other}: dry, or nothing"),
     };
     let mut table: BTreeMap<(usize, usize), Score> = BTreeMap::new();
+
     eprintln!("seed,references,recalled,found,right,iou_sum");
     for seed in first..first + count {
         let survey = kind.map(|kind| Survey::random(kind, seed));
@@ -77,6 +78,7 @@ pub fn run(words: &Words) -> Outcome {
             table.entry(class).or_default().add(&score);
         }
     }
+
     println!(
         "seeds {first} to {}, {SIDE_PX} x {SIDE_PX} px\n",
         first + count - 1
@@ -182,6 +184,7 @@ fn stones(labels: &LabelImage, image: &RgbImage) -> BTreeMap<u32, Stone> {
         0.2126 * r + 0.7152 * g + 0.0722 * b
     };
     let mut stones: BTreeMap<u32, Stone> = BTreeMap::new();
+
     for y in 0..labels.height() {
         for x in 0..labels.width() {
             let label = labels.get(x, y).copied().unwrap_or(0);
@@ -207,5 +210,6 @@ fn stones(labels: &LabelImage, image: &RgbImage) -> BTreeMap<u32, Stone> {
             }
         }
     }
+
     stones
 }

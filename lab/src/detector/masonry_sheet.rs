@@ -20,6 +20,7 @@ pub fn run(words: &Words) -> Outcome {
     };
     let mut sheet = image::RgbImage::new(columns * size, rows * size);
     let start = std::time::Instant::now();
+
     for tile in 0..columns * rows {
         let seed = first + u64::from(tile);
         let sample = masonry_photo_of(&style(seed, size, size), None, seed, size, size);
@@ -34,6 +35,7 @@ pub fn run(words: &Words) -> Outcome {
             sheet.put_pixel(at.0, at.1, image::Rgb(colour));
         }
     }
+
     let each = start.elapsed().as_secs_f64() * 1000.0 / f64::from((columns * rows).max(1));
     sheet.save(path)?;
     println!("{path}: {each:.1} ms a photo");

@@ -30,6 +30,7 @@ pub fn run(words: &Words) -> Outcome {
     };
     let mut optimizer = AdamW::new(AdamWParams::default());
     let start = Instant::now();
+
     for step in 0..steps as usize {
         let chosen: Vec<Sample> = (0..BATCH)
             .map(|i| samples[(step * BATCH + i) % samples.len()].clone())
@@ -44,6 +45,7 @@ pub fn run(words: &Words) -> Outcome {
             println!("{step}: {:.3} = {parts}, {:.0?}", losses.total(), start.elapsed());
         }
     }
+
     let detector = StoneFinder::new(model);
     let pairs: Vec<_> = samples
         .iter()
@@ -58,6 +60,7 @@ pub fn run(words: &Words) -> Outcome {
         })
         .collect();
     println!("{:?}", MaskScore::of(&pairs));
+
     Ok(())
 }
 

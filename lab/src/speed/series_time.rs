@@ -25,6 +25,7 @@ pub fn run(words: &Words) -> Outcome {
         "s a stone and epoch",
         "memory",
     ]);
+
     for epochs in words.list("epochs=", "3,6,12,24") {
         let count: usize = epochs.parse()?;
         let mut places: Vec<SeriesPlace> = (0..stones).map(|i| place(i, count)).collect();
@@ -48,6 +49,7 @@ pub fn run(words: &Words) -> Outcome {
             peak_memory(),
         ]);
     }
+
     Ok(())
 }
 

@@ -68,6 +68,7 @@ pub fn pairs(
         .collect();
     let shifts = local_shifts(&moved);
     let surroundings = Surroundings::new(epochs);
+
     ids.par_iter()
         .zip(&centroids)
         .zip(&shifts)

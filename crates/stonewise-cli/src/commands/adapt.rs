@@ -29,6 +29,7 @@ pub fn adapt(args: &AdaptArgs, force: bool, printer: &Printer) -> Result<Outcome
         counted(adapted.masks as u64, "mask"),
         adapted.missed
     ));
+
     let f1 = |score: Option<f64>| score.map_or("unknown".to_owned(), |f1| format!("{f1:.3}"));
     let interval = adapted.gain_interval.map_or_else(
         || "interval unknown".to_owned(),
@@ -42,6 +43,7 @@ pub fn adapt(args: &AdaptArgs, force: bool, printer: &Printer) -> Result<Outcome
         adapted.minutes,
         adapted.gain
     ));
+
     match &adapted.model {
         Some(model) => {
             printer.log(&format!(
@@ -56,5 +58,6 @@ pub fn adapt(args: &AdaptArgs, force: bool, printer: &Printer) -> Result<Outcome
         }
         None => printer.log("no gain is shown: the detector stays as it is"),
     }
+
     Ok(Outcome::Done)
 }

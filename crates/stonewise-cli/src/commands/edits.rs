@@ -32,15 +32,18 @@ fn read_edits(args: &EditsImportArgs, printer: &Printer) -> Result<Outcome> {
         when: args.when.clone().unwrap_or_else(today),
         why: args.why.clone(),
     };
+
     let results = args.results.as_deref();
     let imported = import(&args.source, results, args.epoch.as_deref(), &signed, earlier)?;
     for note in &imported.notes {
         printer.log(&format!("note: {note}"));
     }
+
     if imported.new == 0 {
         printer.log("nothing was edited; no file is written");
         return Ok(Outcome::Done);
     }
+
     imported.file.write()?;
     let first = imported.file.edits.len() - imported.new;
     for edit in &imported.file.edits[first..] {

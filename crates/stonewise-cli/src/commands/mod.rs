@@ -46,6 +46,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         require_start(threads(args.threads))?;
     }
     start_threads(args.threads)?;
+
     match args.command {
         Command::Run(args) => run::run_all(&args, force, printer),
         Command::Plan(args) => units::plan(&args, force, printer),

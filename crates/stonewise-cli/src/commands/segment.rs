@@ -60,6 +60,7 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
         };
         return run::run(&project, Until::Segmented, force, printer);
     }
+
     let mut tiling = TilingOptions::default();
     tiling.scales = args.scales.unwrap_or(tiling.scales);
     tiling.min_score = args.min_score.unwrap_or(tiling.min_score);
@@ -80,6 +81,7 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
         &written,
         force,
     )?;
+
     let summary = segment_folder(
         &FolderJob {
             photos: &args.input,
@@ -95,6 +97,7 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
     for warning in &summary.warnings {
         printer.log(&format!("skipped: {}", warning.line()));
     }
+
     printer.log(&format!(
         "{} in {}; look at {}",
         counted(summary.stones, "stone"),
@@ -104,6 +107,7 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
     if let Some(evaluation) = &summary.evaluation {
         write!(std::io::stdout(), "{}", table(evaluation))?;
     }
+
     Ok(if summary.warnings.is_empty() {
         Outcome::Done
     } else {

@@ -48,11 +48,13 @@ pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome
         .flatten()
         .cloned()
         .collect();
+
     let owner = Owner::inputs("training", &inputs);
     let _folder = OutputFolder::of_inputs(&args.out, &owner, &inputs, &[], force)?;
     let total = args.total_minutes.map(Total::Minutes);
     let mut trainer = open_training(&args.out, &start, config.training, total, args.minutes)?;
     let elapsed = trainer.elapsed();
+
     if elapsed.steps > 0 {
         let minutes = elapsed.seconds / 60.0;
         printer.log(&format!(
@@ -60,6 +62,7 @@ pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome
             counted(elapsed.steps, "step")
         ));
     }
+
     let training = trainer.config().training.clone();
     let (photos, source): (LabelledPhotos, PhotoCrops);
     let rendered = Rendered {
@@ -77,6 +80,7 @@ pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome
         }
         _ => (&rendered, rendered.validation(VALIDATION_IMAGES)),
     };
+
     let run = Run {
         source,
         validation: &validation,
@@ -93,11 +97,13 @@ pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome
         elapsed.seconds / 60.0,
         model_path(&args.out).display()
     ));
+
     match stop {
         Stop::Finished => {}
         Stop::TimeIsUp => printer.log("the time of this run is up; the same command goes on"),
         Stop::Interrupted => bail!("interrupted; run the same command again to continue"),
     }
+
     Ok(Outcome::Done)
 }
 

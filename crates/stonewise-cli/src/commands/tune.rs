@@ -24,6 +24,7 @@ pub fn tune(args: &TuneArgs, force: bool, printer: &Printer) -> Result<Outcome> 
     let folder = OutputFolder::of_inputs(&args.out, &owner, &project.inputs(), &["work", "points"], force)?;
     let tuned = tune_grid(&project, &options, folder.path(), printer)?;
     printer.finish();
+
     let Some(best) = tuned.recommended else {
         bail!(
             "no combination measured any stone; {} says why",
@@ -31,6 +32,7 @@ pub fn tune(args: &TuneArgs, force: bool, printer: &Printer) -> Result<Outcome> 
         );
     };
     let point = &tuned.points[best];
+
     if let Some(errors) = point.errors {
         printer.log(&format!(
             "{} combinations; the recommended one measures {:.0} of {:.0} stones with an RMSE of {:.2} mm (3D)",
@@ -40,6 +42,7 @@ pub fn tune(args: &TuneArgs, force: bool, printer: &Printer) -> Result<Outcome> 
             1e3 * errors.rmse_m
         ));
     }
+
     printer.log(&format!("open {}", args.out.join("index.html").display()));
     write!(std::io::stdout(), "{}", tuned.lines)?;
     Ok(Outcome::Done)

@@ -107,6 +107,7 @@ impl MeshIndex {
         let mut best: Option<(usize, Point3<f64>, Feature)> = None;
         let mut best_d2 = max_m * max_m;
         let mut shell = first;
+
         // Nothing outside of the shells before this one is nearer than their border.
         let before = |shell: i64| ((shell - 1) as f64 + to_border) * self.cell_m;
         while shell == 0 || before(shell).powi(2) <= best_d2 {
@@ -132,6 +133,7 @@ impl MeshIndex {
             }
             shell += 1;
         }
+
         best
     }
 

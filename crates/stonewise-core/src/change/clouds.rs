@@ -40,12 +40,14 @@ pub fn m3c2_clouds(
             normals: normals.len(),
         });
     }
+
     progress.begin("M3C2", core_points.len() as u64);
     let [first, second] = clouds.map(|mut points| {
         points.retain(|p| p.iter().all(|c| c.is_finite()));
         GridIndex::new(&points, params.cylinder_radius_m)
     });
     let mut field = ChangeField::default();
+
     for (number, positions) in core_points.chunks(BATCH).enumerate() {
         progress.check()?;
         let core = match normals {
@@ -57,6 +59,7 @@ pub fn m3c2_clouds(
         field.points.extend(m3c2(&first, &second, &core, params).points);
         progress.advance(positions.len() as u64);
     }
+
     Ok(field)
 }
 

@@ -65,6 +65,7 @@ pub fn m3c2(
             }
         })
         .collect();
+
     ChangeField { points }
 }
 

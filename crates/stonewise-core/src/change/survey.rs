@@ -58,6 +58,7 @@ pub fn m3c2_survey<A: TileSource, B: TileSource>(
         }
         Ok(())
     })?;
+
     Ok(field)
 }
 

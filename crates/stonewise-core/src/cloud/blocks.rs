@@ -55,17 +55,20 @@ impl Blocks {
         for i in 1..next.len() {
             next[i] += next[i - 1];
         }
+
         let mut sorted = vec![0u64; places.len()];
         for (i, (place, bit)) in places.iter().enumerate() {
             let slot = &mut next[*place as usize];
             sorted[*slot as usize] = u64::from(*bit) << 32 | i as u64;
             *slot += 1;
         }
+
         drop(places);
         // `next` now holds where each block ends.
         let mut start = 0;
         blocks.table = next;
         blocks.table.pop();
+
         for entry in &mut blocks.table {
             let end = std::mem::replace(entry, EMPTY) as usize;
             if end > start {
@@ -76,6 +79,7 @@ impl Blocks {
             }
             start = end;
         }
+
         blocks.starts.push(sorted.len() as u32);
         (blocks, sorted.into_iter().map(|key| key as u32).collect())
     }

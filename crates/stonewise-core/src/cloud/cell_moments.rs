@@ -54,6 +54,7 @@ impl<'a> CellMoments<'a> {
                 .positions_within(centre, radius_m, |_, p| sum.add(&(p - centre)));
             return sum;
         }
+
         let Some(cells) = self.index.cells_around(centre, radius_m) else {
             return sum;
         };
@@ -81,6 +82,7 @@ impl<'a> CellMoments<'a> {
                 }
             }
         });
+
         sum
     }
 }

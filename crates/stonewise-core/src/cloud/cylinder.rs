@@ -45,6 +45,7 @@ impl GridIndex {
         else {
             return;
         };
+
         for layer in layers.0..=layers.1 {
             let mut cells = [(layer, layer); 3];
             let bottom = self.origin[main] + layer as f64 * self.cell_m - cylinder.centre[main];

@@ -98,6 +98,7 @@ pub fn score_against_truth(
     let by_id: BTreeMap<StoneId, &TrueStone> = stones.iter().map(|s| (s.stone_id, s)).collect();
     let countable: Vec<&TrueStone> = by_id.into_values().filter(|s| s.is_countable(params)).collect();
     let (mut without_row, mut without_motion, mut samples) = (Vec::new(), Vec::new(), Vec::new());
+
     for stone in &countable {
         let Some(row) = rows.get(&stone.stone_id) else {
             without_row.push(stone.stone_id);
@@ -109,6 +110,7 @@ pub fn score_against_truth(
             None => without_motion.push(stone.stone_id),
         }
     }
+
     TruthScore {
         countable: countable.len(),
         found: samples.len(),

@@ -52,6 +52,7 @@ impl InstanceScore {
             .collect();
         pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
         let mut largest: BTreeMap<u32, f64> = BTreeMap::new();
+
         let (mut used_p, mut used_t) = (BTreeSet::new(), BTreeSet::new());
         let mut found = Vec::new();
         for (iou, p, t) in pairs {
@@ -62,6 +63,7 @@ impl InstanceScore {
                 found.push(iou);
             }
         }
+
         Self {
             predicted: predicted.len(),
             truth: truth.len(),

@@ -101,6 +101,7 @@ impl LabelConfusion {
             per_stone: BTreeMap::new(),
         };
         let mut right_of: BTreeMap<u32, u64> = BTreeMap::new();
+
         for (&(p, t), &n) in &self.counts {
             if t == 0 {
                 score.background_points += n;
@@ -113,6 +114,7 @@ impl LabelConfusion {
                 *right_of.entry(t).or_default() += right;
             }
         }
+
         score.wrong = score.stone_points - score.right - score.unlabelled;
         score.right_share = share(score.right as usize, score.stone_points as usize);
         let sizes = self.true_sizes();

@@ -134,6 +134,7 @@ pub fn score_rotations(
         .iter()
         .filter_map(|(o, s)| MotionSample::of_stone(o, &s.normal, s.displacement_at(&o.centroid), None))
         .collect();
+
     let turn = |common: &Option<SmallMotion>| {
         common
             .as_ref()
@@ -152,6 +153,7 @@ pub fn score_rotations(
             RotationSample::new(&s.normal, own, true_own, &r.covariance_without_datum)
         })
         .collect();
+
     let calibration = |samples: &[RotationSample]| {
         Calibration::of(&samples.iter().map(RotationSample::claim).collect::<Vec<_>>())
     };

@@ -75,6 +75,7 @@ impl Brown {
             0.0
         };
         let (mut x, mut y) = (xd * scale, yd * scale);
+
         for _ in 0..NEWTON_STEPS {
             let ([fx, fy], [a, b, d]) = self.with_jacobian(x, y);
             let (ex, ey) = (fx - xd, fy - yd);
@@ -89,6 +90,7 @@ impl Brown {
                 break;
             }
         }
+
         let [fx, fy] = self.evaluate(x, y, x * x + y * y);
         let converged = (fx - xd).hypot(fy - yd) <= 1e-12 * (1.0 + rd);
         // The tolerance lets a ray at the very edge of the range pass through and back.

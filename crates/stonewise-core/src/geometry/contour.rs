@@ -37,6 +37,7 @@ fn lower_envelope(f: &[f64]) -> Vec<f64> {
         let (pf, qf) = (p as f64, q as f64);
         (f[q] + qf * qf - f[p] - pf * pf) / (2.0 * (qf - pf))
     };
+
     for q in 0..f.len() {
         let mut start = f64::NEG_INFINITY;
         while let Some(&p) = roots.last() {
@@ -52,6 +53,7 @@ fn lower_envelope(f: &[f64]) -> Vec<f64> {
         roots.push(q);
         starts.push(start);
     }
+
     let mut k = 0;
     (0..f.len())
         .map(|x| {
@@ -104,6 +106,7 @@ fn follow(
     // The edge under the walker: an outside cell and an inside neighbour.
     let (mut out, mut inn) = start;
     let mut ring = Vec::new();
+
     loop {
         if inn.0 == out.0 + 1 {
             visited[out.1 * width + out.0] = true;

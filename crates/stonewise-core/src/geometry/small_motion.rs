@@ -46,6 +46,7 @@ impl SmallMotion {
             .iter()
             .map(|(s, _)| (s.place - centre).norm_squared())
             .sum();
+
         // Rotations in units of a typical arm, so that eigenvalues of shifts and rotations compare.
         let arm_m = (square / n).sqrt().max(f64::MIN_POSITIVE);
         let unit = Matrix6::from_diagonal(&Vector6::new(
@@ -57,11 +58,13 @@ impl SmallMotion {
             1.0 / arm_m,
         ));
         let (mut information, mut right) = (Matrix6::zeros(), Vector6::zeros());
+
         for (sample, weight) in &weighted {
             let lever = lever(&(sample.place - centre)) * unit;
             information += lever.transpose() * weight * lever;
             right += lever.transpose() * weight * sample.displacement;
         }
+
         if weighted.is_empty() || !information.iter().all(|v| v.is_finite()) {
             return None;
         }
@@ -70,6 +73,7 @@ impl SmallMotion {
         let inverse = eigen.eigenvalues.map(|v| if v > least { 1.0 / v } else { 0.0 });
         let covariance =
             eigen.eigenvectors * Matrix6::from_diagonal(&inverse) * eigen.eigenvectors.transpose();
+
         Some(Self {
             centre,
             motion: unit * covariance * right,

@@ -43,6 +43,7 @@ impl<const B: usize> BlockPattern<B> {
         let mut pointers = vec![0];
         let mut rows = Vec::new();
         let mut edge_row = vec![0; edges.len()];
+
         for (i, list) in above.iter_mut().enumerate() {
             list.sort_unstable();
             for c in 0..B {
@@ -54,6 +55,7 @@ impl<const B: usize> BlockPattern<B> {
                 pointers.push(rows.len());
             }
         }
+
         let columns = SymbolicSparseColMat::new_checked(nodes * B, nodes * B, pointers, None, rows);
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
@@ -62,6 +64,7 @@ impl<const B: usize> BlockPattern<B> {
         let symbolic =
             factorize_symbolic_cholesky(columns.as_ref(), Side::Lower, SymmetricOrdering::Amd, params)
                 .ok()?;
+
         Some(Self {
             nodes,
             columns,
@@ -91,6 +94,7 @@ impl<const B: usize> BlockPattern<B> {
                 }
             }
         }
+
         for (e, block) in matrix.edges.iter().enumerate() {
             for c in 0..B {
                 let start = pointers[self.edges[e].0 * B + c] + B - c + self.edge_row[e];
@@ -99,6 +103,7 @@ impl<const B: usize> BlockPattern<B> {
                 }
             }
         }
+
         let input = SparseColMatRef::new(self.columns.as_ref(), &values);
         let mut factor = vec![0.0; self.symbolic.len_val()];
         let need = self
@@ -116,6 +121,7 @@ impl<const B: usize> BlockPattern<B> {
                 Default::default(),
             )
             .ok()?;
+
         Some(BlockFactor {
             pattern: self,
             values: factor,

@@ -100,6 +100,7 @@ impl<'a> Known<'a> {
         let symbolic = self.factor.symbolic();
         let mut out = Mat::zeros(pattern.len(), pattern.len());
         let mut from = 0;
+
         while from < pattern.len() {
             let s = self.owner[pattern[from]];
             let width = self.blocks[s].ncols();
@@ -127,6 +128,7 @@ impl<'a> Known<'a> {
             }
             from = until;
         }
+
         out
     }
 

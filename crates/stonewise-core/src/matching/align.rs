@@ -98,6 +98,7 @@ pub fn align_stones(first: &[Stone], second: &[Stone]) -> Result<Alignment, Alig
             second: second.len(),
         });
     }
+
     let search = Search {
         first: Constellation::new(first),
         second: Constellation::new(second),
@@ -112,6 +113,7 @@ pub fn align_stones(first: &[Stone], second: &[Stone]) -> Result<Alignment, Alig
         return Err(AlignError::NotFound { share: 0.0 });
     };
     let others = grown[1..].iter().map(|g| g.fit.motion);
+
     let rival = others
         .chain(search.motions_like(best))
         .filter_map(|motion| search.settle(motion))
@@ -123,6 +125,7 @@ pub fn align_stones(first: &[Stone], second: &[Stone]) -> Result<Alignment, Alig
     let variance = |a: &Agreement| a.share() * (1.0 - a.share()) / a.covered.max(1) as f64;
     let sd = (variance(&best.agreement) + rival.as_ref().map_or(0.0, |r| variance(&r.agreement))).sqrt();
     let leads = share - rival_share >= MIN_LEAD.max(MIN_LEAD_SD * sd);
+
     match leads && best.agreement.same.len() >= MIN_STONES {
         true => Ok(Alignment {
             first_from_second: best.fit.motion,
@@ -192,6 +195,7 @@ impl Search<'_> {
             .into_iter()
             .map(|(j, _)| j)
             .collect();
+
         let frame_second = self.second.frame(seed.stones)?;
         let propose = |&[i, j]: &[usize; 2]| {
             let rotation = nearest_rotation(&(self.first.frame([i, j])? * frame_second.transpose()));
@@ -207,6 +211,7 @@ impl Search<'_> {
                 closeness: agreement.closeness,
             })
         };
+
         let proposals = alike.iter().step_by(step).filter_map(propose);
         proposals.max_by(|a, b| a.closeness.total_cmp(&b.closeness))
     }

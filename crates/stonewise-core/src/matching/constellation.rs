@@ -116,6 +116,7 @@ impl<'a> Constellation<'a> {
         };
         let mut partners: BTreeMap<usize, (f64, usize)> = BTreeMap::new();
         let mut covered = 0;
+
         for j in among {
             let place = motion * other[j].centroid;
             let Some((i, d2)) = self.index.nearest(&place, COVERED_SIZES * self.size_m) else {
@@ -128,6 +129,7 @@ impl<'a> Constellation<'a> {
                 partners.insert(i, (distance, j));
             }
         }
+
         Agreement {
             closeness: partners.values().map(|&(d, _)| 1.0 - d * d).sum(),
             same: partners.into_iter().map(|(i, (_, j))| [i, j]).collect(),
@@ -157,6 +159,7 @@ pub(super) fn rigid_fit(places: &[[Point3<f64>; 2]], start: Option<&Rigid3>) -> 
         }
     };
     let total: f64 = weights.iter().sum();
+
     let [mean_a, mean_b] = [0, 1].map(|e| {
         let moved = places.iter().zip(&weights);
         let origin = places[0][e];
@@ -173,6 +176,7 @@ pub(super) fn rigid_fit(places: &[[Point3<f64>; 2]], start: Option<&Rigid3>) -> 
         .zip(&weights)
         .map(|(pair, w)| w * distance(&motion, pair).powi(2))
         .sum();
+
     let rms_m = (misfit / total).sqrt();
     Some(RigidFit { motion, rms_m })
 }

@@ -110,6 +110,7 @@ pub fn match_stones(
         first: a,
         second: b,
     };
+
     let trials: Vec<Trial> = (0..first.len())
         .map(|i| try_one(i, &places[i], &sides, surroundings, params))
         .collect();
@@ -119,6 +120,7 @@ pub fn match_stones(
     }
     let mut used: Vec<StoneId> = outcomes.iter().filter_map(|o| partner(&o.1)).collect();
     used.sort_unstable();
+
     MatchReport {
         unmatched_second: second
             .iter()
@@ -161,6 +163,7 @@ fn try_one(
             UnmatchedReason::Unseen
         }
     };
+
     let near = second.nearest(place, 2);
     let Some(&(j, distance_m)) = near.first() else {
         return Trial {
@@ -178,6 +181,7 @@ fn try_one(
             .map_or(0.0, |n| distance_m / n.1.max(f64::MIN_POSITIVE)),
         area_ratio: area_ratio(stone, candidate),
     };
+
     let mutual = || back.nearest(&candidate.centroid, 1).first().map(|n| n.0) == Some(i);
     let outcome = if distance_m > params.max_offset_m(stone.area_m2.max(candidate.area_m2)) {
         Err(absent())
@@ -188,6 +192,7 @@ fn try_one(
     } else {
         Ok(j)
     };
+
     Trial {
         outcome,
         quality: Some(quality),

@@ -39,6 +39,7 @@ pub fn tracks(reference: &[Stone], epochs: &[LaterStones], params: &MatchParams)
     let last = reference.iter().map(|s| s.id.0).max().unwrap_or(0);
     let mut next = last + 1;
     let mut followed: Vec<Track> = Vec::new();
+
     for (place, epoch) in epochs.iter().enumerate() {
         let mut taken = epoch.known.clone();
         if !followed.is_empty() {
@@ -73,6 +74,7 @@ pub fn tracks(reference: &[Stone], epochs: &[LaterStones], params: &MatchParams)
             next += 1;
         }
     }
+
     followed.retain(|t| t.seen.iter().flatten().count() > 1);
     for (number, track) in (last + 1..).zip(&mut followed) {
         track.stone.id = StoneId(number);

@@ -20,6 +20,7 @@ pub fn connected_components(labels: &LabelImage) -> (LabelImage, Vec<Component>)
     let data = labels.data();
     let mut parent: Vec<u32> = Vec::new();
     let mut numbers = vec![0u32; data.len()];
+
     for y in 0..height {
         for x in 0..width {
             let i = y * width + x;
@@ -46,6 +47,7 @@ pub fn connected_components(labels: &LabelImage) -> (LabelImage, Vec<Component>)
             };
         }
     }
+
     let mut parts: Vec<Component> = Vec::new();
     let mut final_number = vec![0u32; parent.len()];
     for (number, &label) in numbers.iter_mut().zip(data) {
@@ -60,6 +62,7 @@ pub fn connected_components(labels: &LabelImage) -> (LabelImage, Vec<Component>)
         *number = final_number[root];
         parts[*number as usize - 1].area += 1;
     }
+
     let image = Raster::from_vec(labels.width(), labels.height(), numbers);
     (
         image.unwrap_or_else(|| Raster::filled(labels.width(), labels.height(), 0)),

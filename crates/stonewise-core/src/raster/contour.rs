@@ -37,6 +37,7 @@ pub fn label_outlines(labels: &LabelImage) -> BTreeMap<u32, Vec<Ring>> {
             }
         }
     }
+
     edges
         .into_iter()
         .map(|(label, edges)| (label, link(edges)))
@@ -115,6 +116,7 @@ fn link(mut edges: Edges) -> Vec<Ring> {
         }
         rings.push(ring);
     }
+
     rings
 }
 

@@ -66,6 +66,7 @@ impl Rle {
         let bytes = text.as_bytes();
         let mut counts: Vec<u32> = Vec::new();
         let mut at = 0;
+
         while at < bytes.len() {
             let start = at;
             let broken = || RleError::BrokenText { at: start };
@@ -92,6 +93,7 @@ impl Rle {
             }
             counts.push(u32::try_from(value).map_err(|_| broken())?);
         }
+
         Self::from_counts(width, height, counts)
     }
 

@@ -111,6 +111,7 @@ pub fn analyse(
         have: epochs.len(),
         need: LEAST_EPOCHS,
     };
+
     found.answers = unanswered(&few);
     if epochs.len() < LEAST_OF_A_LINE {
         return found;
@@ -126,6 +127,7 @@ pub fn analyse(
     let Some(model) = choose(&models, &stones) else {
         return found;
     };
+
     let settled = settle(model, &stones, zones);
     found.basis = Some(model.basis.clone());
     found.factors = Some(settled.factors);
@@ -145,6 +147,7 @@ pub fn analyse(
         trend: trend(&found),
         anomaly: anomaly(&settled, model, &epochs),
     };
+
     found
 }
 
@@ -168,6 +171,7 @@ fn choose<'a>(models: &'a [Model], stones: &[StoneSeries]) -> Option<&'a Model> 
         .map(Seen::of)
         .collect();
     let epochs = plain.design.nrows() as f64;
+
     // Stones that no model fits count less, the same in all models.
     let weight = |seen: &Seen| {
         let fits = seen.fit(&largest.design)?;
@@ -176,10 +180,12 @@ fn choose<'a>(models: &'a [Model], stones: &[StoneSeries]) -> Option<&'a Model> 
             (OUTLYING_FACTOR / factor).min(1.0)
         }))
     };
+
     let weights: Vec<Option<[f64; 3]>> = complete.par_iter().map(weight).collect();
     if complete.is_empty() {
         return Some(plain);
     }
+
     let criterion = |model: &Model| {
         let residuals = |(seen, weights): (&Seen, &Option<[f64; 3]>)| {
             let (fits, weights) = (seen.fit(&model.design)?, weights.as_ref()?);
@@ -195,6 +201,7 @@ fn choose<'a>(models: &'a [Model], stones: &[StoneSeries]) -> Option<&'a Model> 
         let mean = sum / (3.0 * complete.len() as f64 * epochs);
         mean.max(f64::MIN_POSITIVE).ln() + 2.0 * share / (1.0 - share)
     };
+
     let by_criterion = models.iter().map(|m| (m, criterion(m)));
     by_criterion.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(m, _)| m)
 }
@@ -236,6 +243,7 @@ fn described(settled: &Settled, model: &Model, places: &[usize], stones: &[Stone
             }),
         })
     };
+
     let mut all: Vec<StoneTrend> = settled.stones.iter().filter_map(describe).collect();
     let p: Vec<f64> = all.iter().map(|s| s.velocity.p).collect();
     all.iter_mut()

@@ -147,12 +147,14 @@ impl Answer {
             .iter()
             .copied()
             .max_by(|a, b| length(a).total_cmp(&length(b)));
+
         let mut widths: Vec<f64> = found.iter().map(|f| 1e3 * Z * f.does.sd.max()).collect();
         let opposite = match if_named {
             Word::Yes => Word::No,
             Word::No => Word::Yes,
             Word::CannotTell => Word::CannotTell,
         };
+
         Self {
             answer: if named.is_empty() { opposite } else { if_named },
             reason: None,

@@ -34,11 +34,13 @@ pub(super) fn fit(design: &DMatrix<f64>, values: &[f64], variances: &[f64]) -> O
     }
     let mut a = design.clone();
     let mut y = DVector::from_column_slice(values);
+
     for (row, variance) in variances.iter().enumerate() {
         let root = 1.0 / variance.sqrt();
         a.row_mut(row).scale_mut(root);
         y[row] *= root;
     }
+
     // Columns have different units.
     let scale: Vec<f64> = (0..unknowns).map(|c| a.column(c).norm()).collect();
     if scale.contains(&0.0) {
@@ -53,6 +55,7 @@ pub(super) fn fit(design: &DMatrix<f64>, values: &[f64], variances: &[f64]) -> O
     let inverse = normal.cholesky()?.inverse();
     let mut coefficients = &inverse * (a.transpose() * &y);
     let residuals = (&y - &a * &coefficients).norm_squared();
+
     coefficients.iter_mut().zip(&scale).for_each(|(c, s)| *c /= s);
     let covariance = inverse.map_with_location(|r, c, v| v / (scale[r] * scale[c]));
     Some(Fit {

@@ -33,6 +33,7 @@ impl VarianceFactor {
             (*freedom > 0 && variance > 0.0)
                 .then(|| (variance.ln() - digamma(half) + half.ln(), trigamma(half)))
         };
+
         let logs: Vec<(f64, f64)> = residuals.iter().filter_map(of_stone).collect();
         let count = logs.len() as f64;
         if logs.len() < 2 {
@@ -41,6 +42,7 @@ impl VarianceFactor {
                 freedom: None,
             };
         }
+
         let mean = logs.iter().map(|l| l.0).sum::<f64>() / count;
         let excess = logs
             .iter()
@@ -53,6 +55,7 @@ impl VarianceFactor {
             }
             false => (mean, None),
         };
+
         Self {
             factor: log.exp().max(1.0),
             freedom,

@@ -179,6 +179,7 @@ fn steps_with_zones(
             }
         }
     }
+
     shared
 }
 
@@ -205,6 +206,7 @@ fn steps_for_trends(fitted: &mut [Fitted], model: &Model, factors: &[VarianceFac
         .collect();
     let q = q_values(&trends.iter().map(|t| t.p).collect::<Vec<f64>>());
     let epochs = model.design.nrows();
+
     let fit = |fits: &[Fit; 3]| -> f64 {
         let squares = fits
             .iter()
@@ -212,6 +214,7 @@ fn steps_for_trends(fitted: &mut [Fitted], model: &Model, factors: &[VarianceFac
             .map(|(fit, factor)| fit.residuals / factor.factor);
         -squares.sum::<f64>()
     };
+
     let plain = without_trend(&model.design);
     let rival = |stone: usize| {
         let of = &fitted[stone];
@@ -226,11 +229,13 @@ fn steps_for_trends(fitted: &mut [Fitted], model: &Model, factors: &[VarianceFac
             steps: (1..epochs).map(step).collect(),
         })
     };
+
     let rivals: Vec<Rival> = (0..fitted.len()).into_par_iter().filter_map(rival).collect();
     // The trend first, then a step before each epoch.
     let mut shares = vec![0.5 / (epochs - 1) as f64; epochs];
     shares[0] = 0.5;
     let mut likeliest = Vec::new();
+
     for _ in 0..MIXTURE_ROUNDS {
         let mut sums = vec![1.0 / epochs as f64; epochs];
         likeliest.clear();
@@ -253,6 +258,7 @@ fn steps_for_trends(fitted: &mut [Fitted], model: &Model, factors: &[VarianceFac
         let total: f64 = sums.iter().sum();
         shares = sums.into_iter().map(|sum| sum / total).collect();
     }
+
     for (rival, epoch) in rivals.iter().zip(likeliest).filter(|(_, class)| *class > 0) {
         let stone = &mut fitted[rival.stone];
         let both = stone.seen.fit(&with_step(&model.design, epoch));

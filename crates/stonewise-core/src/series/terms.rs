@@ -106,6 +106,7 @@ pub(super) fn models(epochs: &[&SeriesEpoch]) -> (Vec<Model>, Vec<Inseparable>) 
     };
     let mut refused = Vec::new();
     let mut alone = Vec::new();
+
     for term in Term::OTHERS {
         match carried(epochs, &plain, term) {
             Ok(()) => alone.push(term),
@@ -113,6 +114,7 @@ pub(super) fn models(epochs: &[&SeriesEpoch]) -> (Vec<Model>, Vec<Inseparable>) 
             Err(None) => {}
         }
     }
+
     let mut models = vec![plain];
     for bits in 1_u32..(1 << alone.len()) {
         let terms: Vec<Term> = (0..alone.len())
@@ -139,6 +141,7 @@ pub(super) fn models(epochs: &[&SeriesEpoch]) -> (Vec<Model>, Vec<Inseparable>) 
             refused.push(Inseparable { term: *term, why });
         }
     }
+
     (models, refused)
 }
 

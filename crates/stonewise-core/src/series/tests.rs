@@ -248,10 +248,12 @@ fn a_step_that_looks_partly_like_a_trend_is_told_from_one() {
         named(anomaly, 0..15) >= 10 && named(anomaly, 15..60) <= 3,
         "{anomaly:?}"
     );
+
     let instead = found.stones[..15]
         .iter()
         .filter(|s| s.velocity.value == Vector3::zeros());
     assert!(instead.clone().count() >= 6);
+
     for stone in instead {
         let step = stone.step.unwrap();
         assert!(
@@ -259,6 +261,7 @@ fn a_step_that_looks_partly_like_a_trend_is_told_from_one() {
             "{step:?}"
         );
     }
+
     let at = found.stones[..15]
         .iter()
         .filter(|s| s.step.is_some_and(|step| step.epoch == 3));
@@ -271,6 +274,7 @@ fn groups_follow_level_season_and_steps_and_predict_other_days() {
     let level = |k: usize| 300.0 + [0.0, 3.0, 1.0, 4.0, 2.5, 0.5, 3.5, 1.5][k * 5 % 8];
     let all: Vec<SeriesEpoch> = (0..12).map(|k| epoch(k + 1, 0.29 * k as f64, level(k))).collect();
     let wave = |years: f64| (std::f64::consts::TAU * (years - 0.6)).cos();
+
     let at = |i: usize, years: f64, level: f64, stepped: bool| {
         let step = if i.is_multiple_of(2) && stepped {
             -1.5e-3
@@ -279,6 +283,7 @@ fn groups_follow_level_season_and_steps_and_predict_other_days() {
         };
         Vector3::new(0.0, step, 0.4e-3 * (level - 300.0) + 0.8e-3 * wave(years))
     };
+
     let truth = |i: usize, k: usize| at(i, 0.29 * k as f64, level(k), k >= 6) - at(i, 0.0, level(0), false);
     let mut stones = measured(&mut Draw(21), 40, 12, 0, truth);
     // An epoch that misses half of the stones does not bend the path.
@@ -293,11 +298,13 @@ fn groups_follow_level_season_and_steps_and_predict_other_days() {
         .iter()
         .map(|s| (s, &stones[s.stone.0 as usize]))
         .collect();
+
     let group = Group::new(&all, found.basis.as_ref().unwrap(), members).unwrap();
     let mean = |years: f64, level: f64, stepped: bool| {
         let of = |i: usize| at(i, years, level, stepped) - at(i, 0.0, 300.0, false);
         (0..40).map(of).sum::<Vector3<f64>>() / 40.0
     };
+
     for (years, level) in [(0.5, 301.0), (1.5, 303.0), (3.6, 302.0)] {
         let predicted = group.predicted(&epoch(0, years, level)).unwrap();
         let error = predicted.value - mean(years, level, years >= 0.29 * 6.0);
@@ -306,6 +313,7 @@ fn groups_follow_level_season_and_steps_and_predict_other_days() {
             "{years}: {predicted:?}"
         );
     }
+
     let ninth = group.measured(9).unwrap();
     let error = ninth.value - mean(0.29 * 9.0, level(9), true);
     assert!((0..3).all(|k| error[k].abs() < 3.0 * ninth.sd[k]), "{ninth:?}");
@@ -383,6 +391,7 @@ fn what_cannot_be_told_apart_is_named() {
             .any(|i| i.term == Term::Season && i.why == goes_with_level),
         "{found:?}"
     );
+
     // A level that rises with time may be the cause of what looks like a trend.
     let rising: Vec<SeriesEpoch> = (0..6).map(|k| epoch(k, k as f64, 300.0 + k as f64)).collect();
     let creep = |_: usize, k: usize| Vector3::z() * 1e-3 * k as f64;
@@ -392,6 +401,7 @@ fn what_cannot_be_told_apart_is_named() {
         found.answers.trend.reason,
         Some(Unanswered::GoesWith { term: Term::Level })
     );
+
     assert!(found.inseparable.contains(&Inseparable {
         term: Term::Season,
         why: WhyInseparable::Same

@@ -41,6 +41,7 @@ impl Zone {
             return None;
         }
         let count = complete.len() as f64;
+
         let mean = |k: usize| {
             let value: Vector3<f64> = complete.iter().map(|looks| looks[k].value).sum();
             let sd: Vector3<f64> = complete
@@ -52,6 +53,7 @@ impl Zone {
                 variance: (sd / count).map(|sd| sd * sd),
             }
         };
+
         let looks = (0..epochs.len()).map(mean).collect();
         Some(Self {
             members,

@@ -50,6 +50,7 @@ impl SurfaceCell {
         }
         let plane = Plane::of_moments(&base, &moments)?;
         let [thin, narrow, wide] = plane.spread_m;
+
         // Points along a line are an edge or a cable.
         if thin > MOST_THICKNESS * narrow || narrow < 0.2 * wide {
             return None;
@@ -63,6 +64,7 @@ impl SurfaceCell {
                     .powi(3)
             })
             .sum();
+
         // An evenly covered rectangle has variances of a twelfth of the squares of its sides.
         let area_m2 = 12.0 * narrow * wide;
         Some(Self {

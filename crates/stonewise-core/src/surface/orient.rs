@@ -167,17 +167,21 @@ pub fn orient(mut cells: Vec<SurfaceCell>, cell_m: f64, scanners: &[Point3<f64>]
         mut ties,
         ..
     } = parts;
+
     // One node more stands for what points outside.
     let outside = parts.len();
     ties.push(BTreeMap::new());
+
     for (part, own) in evidence.iter().enumerate().filter(|(_, own)| own.total() != 0.0) {
         ties[part].insert(outside, own.total());
         ties[outside].insert(part, own.total());
     }
+
     let forest = contracted(ties);
     let (_, of_outside) = forest.root(outside);
     let (mut sum, mut odds) = (Evidence::default(), Vec::new());
     let shows_walls = cells.iter().any(is_wall);
+
     for (i, (part, own)) in parts.iter().zip(evidence).enumerate() {
         let is_inward = forest.root(i).1 != of_outside;
         sum = sum.plus(if is_inward { own.reversed() } else { own });
@@ -188,6 +192,7 @@ pub fn orient(mut cells: Vec<SurfaceCell>, cell_m: f64, scanners: &[Point3<f64>]
             part.iter().for_each(|&i| cells[i] = cells[i].flipped());
         }
     }
+
     Orientation {
         cells,
         evidence: sum,
@@ -254,6 +259,7 @@ impl<'a> Scene<'a> {
         } = parts;
         let centroids: Vec<Point3<f64>> = self.cells.iter().map(|c| c.centroid).collect();
         let index = GridIndex::new(&centroids, BESIDE_M);
+
         for (part, members) in members.iter().enumerate() {
             let mut sums: BTreeMap<usize, f64> = BTreeMap::new();
             let mut behind: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();

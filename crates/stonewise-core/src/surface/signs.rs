@@ -38,6 +38,7 @@ pub(super) fn smooth_parts(cells: &mut [SurfaceCell]) -> Parts {
         let cosines = others.iter().map(|&j| (j, cells[i].normal.dot(&cells[j].normal)));
         smooth[i].extend(cosines.filter(|(_, cosine)| cosine.abs() > PART_COSINE));
     }
+
     let forest = contracted(smooth);
     let mut members: CellMap<usize, Vec<usize>> = CellMap::default();
     for (i, cell) in cells.iter_mut().enumerate() {
@@ -47,6 +48,7 @@ pub(super) fn smooth_parts(cells: &mut [SurfaceCell]) -> Parts {
         }
         members.entry(root).or_default().push(i);
     }
+
     let mut members: Vec<Vec<usize>> = members.into_values().collect();
     members.sort_by_key(|part| (std::cmp::Reverse(part.len()), part[0]));
     let mut of_cell = vec![0; cells.len()];
@@ -54,11 +56,13 @@ pub(super) fn smooth_parts(cells: &mut [SurfaceCell]) -> Parts {
         own.iter().for_each(|&i| of_cell[i] = part);
     }
     let mut ties: Ties = vec![BTreeMap::new(); members.len()];
+
     for (i, others) in neighbours.iter().enumerate() {
         for &j in others.iter().filter(|&&j| of_cell[j] != of_cell[i]) {
             *ties[of_cell[i]].entry(of_cell[j]).or_default() += tie_of(&cells[i], &cells[j]);
         }
     }
+
     Parts {
         members,
         of_cell,
@@ -74,6 +78,7 @@ pub(super) fn contracted(mut ties: Ties) -> Forest {
         queue.extend(of_a.range(a..).map(|(b, tie)| Tie::new([a, *b], *tie)));
     }
     let mut forest = Forest::new(ties.len());
+
     while let Some(Tie {
         strength,
         ends: [a, b],
@@ -101,6 +106,7 @@ pub(super) fn contracted(mut ties: Ties) -> Forest {
         }
         forest.join([kept, taken], is_opposite, strength);
     }
+
     forest
 }
 

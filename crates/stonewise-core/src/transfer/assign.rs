@@ -66,21 +66,25 @@ fn solve(block: &[Edge]) -> Vec<(u32, u32)> {
     }
     let mut rows: Vec<u32> = block.iter().map(|e| e.0).collect();
     let mut columns: Vec<u32> = block.iter().map(|e| e.1).collect();
+
     for side in [&mut rows, &mut columns] {
         side.sort_unstable();
         side.dedup();
     }
+
     let turned = rows.len() > columns.len();
     if turned {
         std::mem::swap(&mut rows, &mut columns);
     }
     let mut weights = Matrix::new(rows.len(), columns.len(), 0i64);
+
     for &(i, j, iou) in block {
         let (row, column) = if turned { (j, i) } else { (i, j) };
         if let (Ok(r), Ok(c)) = (rows.binary_search(&row), columns.binary_search(&column)) {
             weights[(r, c)] = (iou * 1e9) as i64;
         }
     }
+
     let (_, assigned) = kuhn_munkres(&weights);
     assigned
         .iter()

@@ -170,12 +170,14 @@ pub(super) fn splat_all<T: TileSource>(
     let cones: Vec<Cone> = views.iter().map(|v| Cone::of(v)).collect();
     let mut surfaces = Vec::with_capacity(tiles.tile_count());
     progress.begin("depth maps", 2 * tiles.tile_count() as u64);
+
     for tile in 0..tiles.tile_count() {
         progress.check()?;
         let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
         surfaces.push(SurfaceCells::new(&cloud, params.cell_m));
         progress.advance(1);
     }
+
     limit_spacings(&mut surfaces);
     for (tile, surface) in surfaces.iter().enumerate() {
         progress.check()?;
@@ -191,6 +193,7 @@ pub(super) fn splat_all<T: TileSource>(
             });
         progress.advance(1);
     }
+
     Ok((maps, surfaces))
 }
 

@@ -49,6 +49,7 @@ impl Election {
                 out.list(stones.iter(), |out, &stone| out.u32(stone));
             }
         });
+
         out.list(self.decisions.iter(), |out, (&instance, decision)| {
             out.u32(instance);
             match decision {
@@ -66,6 +67,7 @@ impl Election {
                 }
             }
         });
+
         out.0
     }
 
@@ -90,6 +92,7 @@ impl Election {
             2 => Ok(Ballot::AnyOf(bytes.list(Reader::u32)?)),
             _ => Err(TransferError::Damaged),
         })?;
+
         let decisions = bytes.list(|bytes| {
             let instance = bytes.u32()?;
             let decision = match bytes.u32()? {
@@ -103,6 +106,7 @@ impl Election {
         if ballots.len() != instances.len() || instances.iter().any(|i| i.photo as usize >= masked.len()) {
             return Err(TransferError::Damaged);
         }
+
         Ok(Self {
             masked,
             overlaps: Overlaps::of_instances(instances),

@@ -37,6 +37,7 @@ pub(super) fn decide<'a>(
             ballots[i as usize] = Ballot::One(stone);
         }
     }
+
     let mut decisions = BTreeMap::new();
     let mut electorate = Electorate::new(overlaps, ballots, params.border_weight);
     for _ in 0..MAX_ROUNDS {
@@ -56,6 +57,7 @@ pub(super) fn decide<'a>(
         }
         electorate = Electorate::new(overlaps, ballots, params.border_weight);
     }
+
     (electorate, decisions)
 }
 
@@ -162,6 +164,7 @@ fn changes(electorate: &Electorate, tables: &Tables, params: &TransferParams) ->
                 _ => None,
             })
     };
+
     let merged: Vec<_> = singles()
         .filter_map(|(i, _)| {
             let stones = tables.contained(i, params.merged_share);
@@ -180,15 +183,18 @@ fn changes(electorate: &Electorate, tables: &Tables, params: &TransferParams) ->
             (stone != own && share > 0.5).then_some((i, Decision::Fragment(stone, share)))
         })
         .collect();
+
     if !fragments.is_empty() {
         return fragments;
     }
     let mut balance: BTreeMap<u32, (u64, u64)> = BTreeMap::new();
+
     for (i, stone) in singles() {
         let entry = balance.entry(stone).or_default();
         entry.0 += u64::from(tables.won[i as usize].get(&stone).copied().unwrap_or(0));
         entry.1 += u64::from(tables.area[i as usize]);
     }
+
     singles()
         .filter_map(|(i, stone)| {
             let (won, all) = balance[&stone];

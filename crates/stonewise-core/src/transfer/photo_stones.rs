@@ -60,6 +60,7 @@ where
         }
         Ok(())
     })?;
+
     for _ in 0..REACH {
         cells = filled(&cells);
     }
@@ -68,12 +69,14 @@ where
         known: Raster::filled(width, height, false),
     };
     let pixels = shown.stones.data_mut().iter_mut().zip(shown.known.data_mut());
+
     for (index, (stone, known)) in pixels.enumerate() {
         let (x, y) = (index as u32 % width, index as u32 / width);
         if let Some(cell) = cells.get(x / CELL_PX, y / CELL_PX).filter(|c| c.lead > 0) {
             (*stone, *known) = (cell.stone, true);
         }
     }
+
     Ok(shown)
 }
 

@@ -72,6 +72,7 @@ pub fn build_stones<T: TileSource, S: LabelStore>(
             (id, Patch::new(s, s.face_normal(&face, params, &towards)))
         })
         .collect();
+
     each_tile(tiles, labels, "stone faces", progress, |_, cloud, labels| {
         for (i, stone) in labels.stone.iter().enumerate() {
             if let Some(patch) = patches.get_mut(stone) {
@@ -79,6 +80,7 @@ pub fn build_stones<T: TileSource, S: LabelStore>(
             }
         }
     })?;
+
     Ok(sums
         .iter()
         .zip(patches.values())

@@ -246,6 +246,7 @@ fn measure(around: &Neighbourhood, (cell, ids): &Members) -> LocalSurface {
     let step = ids.len().div_ceil(SAMPLES).max(1);
     let mut spacings = Vec::new();
     let mut noises = Vec::new();
+
     for &i in ids.iter().skip(step / 2).step_by(step) {
         let found = around.nearest_k(cell, &points[i as usize], NEIGHBOURS + 1, MAX_NEIGHBOUR_M);
         let near: Vec<Point3<f64>> = found.iter().map(|f| points[f.0]).collect();
@@ -261,6 +262,7 @@ fn measure(around: &Neighbourhood, (cell, ids): &Members) -> LocalSurface {
             noises.push(spread * (near.len() as f64 / (near.len() - 3) as f64).sqrt());
         }
     }
+
     let spacing = upper_median(&mut spacings).unwrap_or(0.0);
     let thinned: Vec<Point3<f64>> = thinned(points, ids);
     let normal = if thinned.len() >= 3 {
@@ -268,6 +270,7 @@ fn measure(around: &Neighbourhood, (cell, ids): &Members) -> LocalSurface {
     } else {
         Vector3::zeros()
     };
+
     LocalSurface {
         normal: normal.cast(),
         spacing_m: spacing.min(around.cell_m) as f32,

@@ -17,6 +17,7 @@ pub(super) fn group(overlaps: &Overlaps, pairs: &[(u32, u32)], min_iou: f64) -> 
     let mut neighbours: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); count];
     let mut version = vec![0u32; count];
     let mut queue = BinaryHeap::new();
+
     for &(i, j) in pairs {
         neighbours[i as usize].insert(j as usize);
         neighbours[j as usize].insert(i as usize);
@@ -29,6 +30,7 @@ pub(super) fn group(overlaps: &Overlaps, pairs: &[(u32, u32)], min_iou: f64) -> 
             min_iou,
         );
     }
+
     while let Some(Candidate {
         ends: [a, b],
         versions,
@@ -64,6 +66,7 @@ pub(super) fn group(overlaps: &Overlaps, pairs: &[(u32, u32)], min_iou: f64) -> 
             );
         }
     }
+
     groups.retain(|g| !g.is_empty());
     groups.sort_unstable();
     groups

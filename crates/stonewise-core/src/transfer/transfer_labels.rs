@@ -162,6 +162,7 @@ impl<'a> PreparedTransfer<'a> {
             spacing_m: observer.spacing_m(),
             overlaps,
         };
+
         Ok(Self {
             observer,
             election,
@@ -205,6 +206,7 @@ impl<'a> PreparedTransfer<'a> {
             let depth = kept.depth(photo).map_err(|e| of_photo(Box::new(e)))?;
             depths.push(SplatDepth::decode(&depth)?);
         }
+
         let surface = |tile| {
             let bytes = kept.surface(tile).map_err(|e| TransferError::tile(tile, e))?;
             SurfaceCells::decode(&bytes)
@@ -366,6 +368,7 @@ fn remove<T: TileSource, S: LabelStore>(
             }
         })
         .collect();
+
     progress.each("islands", 0..tiles.tile_count(), |tile| {
         let bounds = tiles.bounds(tile);
         if !boxes.iter().any(|b| b.intersects(&bounds)) {

@@ -45,6 +45,7 @@ pub(super) fn each_visible<T: TileSource>(
     let (maps, surfaces) = splat_all(&shown, &[view], params, &Silent)?;
     let centre = view.centre();
     let mut visible = Vec::new();
+
     for (tile, surface) in surfaces.iter().enumerate() {
         progress.check()?;
         let cloud = shown.load(tile).map_err(|e| TransferError::tile(tile, e))?;
@@ -69,6 +70,7 @@ pub(super) fn each_visible<T: TileSource>(
         }
         visit(shown.which[tile], &visible)?;
     }
+
     Ok(())
 }
 

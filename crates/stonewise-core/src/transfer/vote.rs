@@ -83,6 +83,7 @@ impl<'a> Electorate<'a> {
         let mut total = 0.0;
         let mut undecided: Vec<(f64, &[u32])> = Vec::new();
         let mut background = 0.0;
+
         for s in sightings {
             let weight = f64::from(s.weight);
             match self
@@ -97,11 +98,13 @@ impl<'a> Electorate<'a> {
             }
             total += weight;
         }
+
         for (weight, stones) in undecided {
             if let Some((stone, _)) = leader(tally.iter().filter(|t| stones.contains(&t.0))) {
                 cast(&mut tally, stone, weight);
             }
         }
+
         if total <= 0.0 {
             return None;
         }
@@ -118,6 +121,7 @@ impl<'a> Electorate<'a> {
             .filter(|s| self.shows(stone, s.photo))
             .map(|s| f64::from(s.weight) * self.border_weight)
             .sum();
+
         Some(if votes >= against {
             Verdict {
                 stone: Some(stone),

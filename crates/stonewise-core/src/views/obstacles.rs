@@ -54,18 +54,21 @@ impl Bodies {
         let most = counts.values().copied().max().unwrap_or(0) as f64;
         let is_small = |cell: &SurfaceCell| (counts[&body(cell)] as f64) < SMALL * most;
         let key = |place: &Vector3<f64>| [place.x, place.y].map(|v| floor(v / cell_m));
+
         // How far out the large bodies reach in each direction.
         let mut deepest: CellMap<[i64; 2], f64> = CellMap::default();
         for (_, place) in cells.iter().zip(places).filter(|(cell, _)| !is_small(cell)) {
             let out_m = deepest.entry(key(place)).or_insert(f64::INFINITY);
             *out_m = out_m.min(place.z);
         }
+
         let is_before = |place: &Vector3<f64>| {
             let [x, y] = key(place);
             let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [x + dx, y + dy]));
             let mut behind = around.filter_map(|key| deepest.get(&key));
             behind.any(|out_m| *out_m < place.z - BEFORE_M)
         };
+
         let mut before: BTreeMap<Option<usize>, usize> = BTreeMap::new();
         for (cell, place) in cells.iter().zip(places) {
             *before.entry(body(cell)).or_default() += usize::from(is_small(cell) && is_before(place));

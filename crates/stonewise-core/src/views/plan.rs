@@ -101,6 +101,7 @@ fn faces_of<'a>(walls: &[&'a SurfaceCell], params: &ViewParams) -> Vec<Face<'a>>
     let near = params.spread_rad.cos();
     let mut left: Vec<&SurfaceCell> = walls.to_vec();
     let mut faces = Vec::new();
+
     while faces.len() < MOST_DIRECTIONS {
         // A few hundred candidates are enough to find a peak that holds a fiftieth of the cells.
         let step = left.len().div_ceil(400).max(1);
@@ -126,6 +127,7 @@ fn faces_of<'a>(walls: &[&'a SurfaceCell], params: &ViewParams) -> Vec<Face<'a>>
         left = rest;
         faces.push(Face { frame, cells });
     }
+
     faces
 }
 
@@ -179,6 +181,7 @@ fn targets_of<'a>(face: &Face<'a>, scene: &Scene, coarser: f64, params: &ViewPar
     let axes = face.frame.face_from_world();
     let mut targets = Vec::new();
     let mut left = vec![face.cells.clone()];
+
     while let Some(cells) = left.pop() {
         if cells.len() < scene.least_cells {
             continue;
@@ -226,6 +229,7 @@ fn targets_of<'a>(face: &Face<'a>, scene: &Scene, coarser: f64, params: &ViewPar
             limit_m,
         });
     }
+
     targets
 }
 

@@ -31,6 +31,7 @@ pub(super) fn relief_shade(depth: &DepthMap, camera: &Camera, side: Side, half_w
         Side::Right => 0.5,
     };
     let light = nalgebra::Vector3::new(across, -0.6, -0.62).normalize();
+
     let mut image = RgbImage::filled(depth.width(), depth.height(), [0; 3]);
     for (at, pixel) in image.data_mut().iter_mut().enumerate() {
         let place = [at % width, at / width];
@@ -53,6 +54,7 @@ pub(super) fn relief_shade(depth: &DepthMap, camera: &Camera, side: Side, half_w
         let grey = 255.0 * (0.25 + 0.75 * light);
         *pixel = [grey.clamp(1.0, 255.0) as u8; 3];
     }
+
     image
 }
 

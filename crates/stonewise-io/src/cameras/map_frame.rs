@@ -70,12 +70,14 @@ impl MapFrame {
                 return Err("the clouds name no system: give theirs as crs under [project]".to_owned());
             }
         };
+
         if !target.shares_datum(&chunk) {
             return Err(format!(
                 "the clouds are in {}, on another geodetic datum, and shifts between datums are not covered",
                 target.name
             ));
         }
+
         match target.coordinates {
             Coordinates::Geocentric => Ok(Placing::Kept),
             Coordinates::Geographic => Err(format!("the clouds are in degrees ({})", target.name)),
@@ -113,6 +115,7 @@ impl MapPlacing {
                 view.name
             ));
         }
+
         let place = self.map(&centre) - self.false_origin;
         let side = |axis: usize| {
             let step = Vector3::ith(axis, STEP_M);
@@ -127,17 +130,20 @@ impl MapPlacing {
         let off_map = || format!("photo {} lies off the map of {}{grid}", view.name, self.name);
         let is_on_map = place.iter().chain(turn.iter()).all(|v| v.is_finite());
         let earth_from_map = turn.try_inverse().filter(|_| is_on_map).ok_or_else(off_map)?;
+
         let seen = calibration(&view.camera)
             * view.cam_from_world.rotation.to_rotation_matrix().matrix()
             * earth_from_map;
         let (calibration, rotation) = split_camera(&seen);
         let is_camera = calibration.iter().chain(rotation.iter()).all(|v| v.is_finite());
+
         if !is_camera || rotation.determinant() < 0.5 {
             return Err(format!(
                 "the camera of photo {} has impossible parameters",
                 view.name
             ));
         }
+
         view.camera.focal_px = [calibration[(0, 0)], calibration[(1, 1)]];
         view.camera.center_px = [calibration[(0, 2)], calibration[(1, 2)]];
         view.camera.skew_px = calibration[(0, 1)];

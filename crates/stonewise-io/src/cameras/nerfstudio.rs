@@ -68,6 +68,7 @@ pub fn read(path: &Path) -> Result<CameraFile, CameraError> {
     let undo = applied
         .try_inverse()
         .ok_or_else(|| bad("applied_transform", "the matrix has no inverse"))?;
+
     let mut file = CameraFile::default();
     for frame in &transforms.frames {
         let place = format!("frame {}", frame.file_path);
@@ -82,6 +83,7 @@ pub fn read(path: &Path) -> Result<CameraFile, CameraError> {
                 .ok_or_else(|| bad(&place, "transform_matrix holds no rotation"))?,
         });
     }
+
     Ok(file)
 }
 
@@ -111,6 +113,7 @@ fn camera(frame: &Frame, shared: &RawCamera, path: &Path) -> Result<Camera, Came
     let of =
         |value: fn(&RawCamera) -> Option<f64>| value(&frame.own).or(value(shared)).filter(|v| v.is_finite());
     let or_zero = |value: fn(&RawCamera) -> Option<f64>| of(value).unwrap_or(0.0);
+
     let needed = |value: fn(&RawCamera) -> Option<f64>, name: &str| {
         of(value).filter(|v| *v > 0.0).ok_or_else(|| {
             malformed(
@@ -120,11 +123,13 @@ fn camera(frame: &Frame, shared: &RawCamera, path: &Path) -> Result<Camera, Came
             )
         })
     };
+
     let (width, height) = (needed(|c| c.w, "w")?, needed(|c| c.h, "h")?);
     if width.max(height) > f64::from(u32::MAX) {
         let problem = format!("impossible image size {width}x{height}");
         return Err(malformed(path, format!("frame {photo}"), problem));
     }
+
     let by_angle = of(|c| c.camera_angle_x).map(|angle| width / 2.0 / (angle / 2.0).tan());
     let fx = match by_angle {
         Some(focal) if of(|c| c.fl_x).is_none() && focal > 0.0 => focal,
@@ -139,6 +144,7 @@ fn camera(frame: &Frame, shared: &RawCamera, path: &Path) -> Result<Camera, Came
     let tangential = [or_zero(|c| c.p1), or_zero(|c| c.p2)];
     let model = frame.own.camera_model.as_ref().or(shared.camera_model.as_ref());
     let [k1, k2, k3, _] = radial;
+
     let distortion = match model.map(String::as_str) {
         None | Some("OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL") => {
             Distortion::brown([k1, k2, k3, 0.0], [0.0; 3], tangential)
@@ -152,6 +158,7 @@ fn camera(frame: &Frame, shared: &RawCamera, path: &Path) -> Result<Camera, Came
             });
         }
     };
+
     Ok(Camera {
         width: width as u32,
         height: height as u32,

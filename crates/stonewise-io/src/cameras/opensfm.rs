@@ -100,6 +100,7 @@ fn camera(raw: &RawCamera, id: &str, photo: &str, path: &Path) -> Result<Camera,
             });
         }
     };
+
     let fx = number("focal_x").or_else(|| number("focal"));
     let fy = number("focal_y").or(fx);
     let (Some(fx), Some(fy)) = (fx.filter(|&f| f > 0.0), fy.filter(|&f| f > 0.0)) else {
@@ -107,6 +108,7 @@ fn camera(raw: &RawCamera, id: &str, photo: &str, path: &Path) -> Result<Camera,
         return Err(malformed(path, format!("camera {id}"), problem));
     };
     let (width, height) = (f64::from(raw.width), f64::from(raw.height));
+
     if raw.width == 0 || raw.height == 0 {
         return Err(malformed(
             path,
@@ -114,6 +116,7 @@ fn camera(raw: &RawCamera, id: &str, photo: &str, path: &Path) -> Result<Camera,
             "width and height must be positive",
         ));
     }
+
     let unit = width.max(height);
     Ok(Camera {
         width: raw.width,

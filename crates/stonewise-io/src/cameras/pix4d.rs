@@ -31,6 +31,7 @@ pub fn read(path: &Path) -> Result<CameraFile, CameraError> {
         .zip(text.lines().map(str::trim))
         .filter(|(_, line)| !line.is_empty());
     let mut file = CameraFile::default();
+
     while let Some((number, line)) = lines.next() {
         // The description of the format comes first.
         let Some((name, width, height)) = photo(line) else {
@@ -62,6 +63,7 @@ pub fn read(path: &Path) -> Result<CameraFile, CameraError> {
         file.views
             .push(view.ok_or_else(|| malformed(path, format!("photo {name}"), problem))?);
     }
+
     Ok(file)
 }
 

@@ -82,12 +82,14 @@ pub fn read_cameras_on_map(
             }
         }
     };
+
     if file.views.is_empty() {
         return Err(CameraError::NoPoses {
             path: path.to_owned(),
             skipped: file.skipped.len(),
         });
     }
+
     check_sizes(&file, path)?;
     check_places(&file, path)?;
     Ok(file)

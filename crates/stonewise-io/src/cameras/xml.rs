@@ -45,6 +45,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Element, CameraError> {
     let mut reader = Reader::from_str(text);
     let mut open = vec![Element::default()];
     let mut lines = LineCounter::new(text);
+
     loop {
         let line = lines.line_at(reader.buffer_position());
         let broken =
@@ -80,6 +81,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Element, CameraError> {
             _ => {}
         }
     }
+
     let root = open
         .pop()
         .and_then(|document| document.children.into_iter().next());

@@ -67,6 +67,7 @@ pub fn cloud_details(path: &Path) -> Result<CloudDetails, CloudError> {
         };
         (summary, head)
     };
+
     Ok(CloudDetails {
         format: head.format,
         software: head.software,

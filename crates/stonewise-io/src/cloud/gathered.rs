@@ -140,14 +140,17 @@ impl Gathered {
         if let Some(all) = &chunk.intensities {
             self.fields.extend("intensity", all.iter().map(|v| f64::from(*v)));
         }
+
         if let Some(all) = &chunk.colors {
             for (k, name) in ["red", "green", "blue"].into_iter().enumerate() {
                 self.fields.extend(name, all.iter().map(|c| f64::from(c[k])));
             }
         }
+
         if let Some(all) = &chunk.times_s {
             self.fields.extend("gps_time", all.iter().copied());
         }
+
         for i in 0..chunk.len() {
             let number = match (&chunk.sources, chunk.scan) {
                 (Some(sources), _) => u32::from(sources[i]),

@@ -259,6 +259,7 @@ fn rectifying(ellipsoid: &Ellipsoid) -> (f64, [f64; 6]) {
         ]),
         power(&[0.0, 0.0, 0.0, 0.0, 0.0, 212_378_941.0 / 319_334_400.0]),
     ];
+
     (radius, series)
 }
 

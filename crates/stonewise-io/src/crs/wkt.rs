@@ -29,6 +29,7 @@ impl<'a> Node<'a> {
             children: Vec::new(),
         };
         let mut rest = text[open + 1..].trim_start();
+
         loop {
             if let Some(quoted) = rest.strip_prefix('"') {
                 let end = quoted.find('"')?;

@@ -135,6 +135,7 @@ fn add_layer(file: &Connection, layer: &Layer, last_change: &str) -> rusqlite::R
             params![crs.name, crs.epsg, definition],
         )?;
     }
+
     let name = &layer.name;
     let columns: String = layer
         .attributes
@@ -150,10 +151,12 @@ fn add_layer(file: &Connection, layer: &Layer, last_change: &str) -> rusqlite::R
          VALUES (?1, 'features', ?2, ?3, ?4, ?5)",
         params![name, layer.title, layer.description, last_change, srs],
     )?;
+
     file.execute(
         "INSERT INTO gpkg_geometry_columns VALUES (?1, 'geom', ?2, ?3, ?4, 0)",
         params![name, kind, srs, i32::from(layer.geometry.has_z())],
     )?;
+
     for column in layer.attributes.names() {
         if let Some((unit, meaning)) = layer.attributes.description(column) {
             let unit = if unit.is_empty() {
@@ -167,6 +170,7 @@ fn add_layer(file: &Connection, layer: &Layer, last_change: &str) -> rusqlite::R
             )?;
         }
     }
+
     file.execute_batch(&rtree(name))?;
     let extent = add_features(file, layer, srs)?;
     if let Some([min_x, max_x, min_y, max_y]) = extent {
@@ -175,6 +179,7 @@ fn add_layer(file: &Connection, layer: &Layer, last_change: &str) -> rusqlite::R
             params![name, min_x, max_x, min_y, max_y],
         )?;
     }
+
     file.execute_batch(&rtree_triggers(name))?;
     for (i, style) in layer.styles.iter().enumerate() {
         add_style(file, name, style, i == 0, last_change)?;
@@ -247,6 +252,7 @@ pub(super) fn cell(column: &Column, row: usize) -> Value {
     if !column.is_filled(row) {
         return Value::Null;
     }
+
     let real = |v: f64| {
         if v.is_finite() {
             Value::Real(v)
@@ -254,6 +260,7 @@ pub(super) fn cell(column: &Column, row: usize) -> Value {
             Value::Null
         }
     };
+
     let integer = column
         .values::<u32>()
         .map(|v| i64::from(v[row]))
@@ -266,6 +273,7 @@ pub(super) fn cell(column: &Column, row: usize) -> Value {
                 .map(|v| i64::try_from(v[row]).unwrap_or(i64::MAX))
         })
         .or_else(|| column.values::<bool>().map(|v| i64::from(v[row])));
+
     if let Some(value) = integer {
         Value::Integer(value)
     } else if let Some(v) = column.values::<f64>() {

@@ -41,10 +41,12 @@ pub fn read_polygons(path: &Path, layer: &str) -> Result<Vec<PolygonFeature>, La
         [layer],
         |row| row.get(0),
     );
+
     let column = column.map_err(|error| match error {
         rusqlite::Error::QueryReturnedNoRows => content(format!("no layer {layer:?} in it")),
         other => sqlite(other),
     })?;
+
     // The name is one of the file's own tables; quotes in it are doubled.
     let table = layer.replace('"', "\"\"");
     let mut query = file
@@ -53,6 +55,7 @@ pub fn read_polygons(path: &Path, layer: &str) -> Result<Vec<PolygonFeature>, La
     let names: Vec<String> = query.column_names().map(str::to_owned).collect();
     let mut rows = query.query([]).map_err(sqlite)?;
     let mut features = Vec::new();
+
     while let Some(row) = rows.next().map_err(sqlite)? {
         let (fid, blob, attributes) = cells(row, &names, &column).map_err(sqlite)?;
         let Some(blob) = blob else { continue };
@@ -64,6 +67,7 @@ pub fn read_polygons(path: &Path, layer: &str) -> Result<Vec<PolygonFeature>, La
             attributes,
         });
     }
+
     Ok(features)
 }
 

@@ -102,6 +102,7 @@ pub(super) fn rtree_triggers(table: &str) -> String {
             drop_old.clone(),
         ),
     ];
+
     triggers
         .iter()
         .map(|(name, event, when, action)| {

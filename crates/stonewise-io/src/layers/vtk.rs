@@ -38,6 +38,7 @@ pub fn write_vtp(path: &Path, data: &PolyData) -> io::Result<()> {
     };
     let even = data.scalars.iter().all(|(_, v)| v.len() == cells)
         && data.vectors.iter().all(|(_, v)| v.len() == cells);
+
     if !even || data.polygons.iter().flatten().any(|&i| i as usize >= points) {
         let message = format!(
             "the columns of polygonal data do not fit together: {}",
@@ -45,6 +46,7 @@ pub fn write_vtp(path: &Path, data: &PolyData) -> io::Result<()> {
         );
         return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
     }
+
     let corners: Vec<Vec<u32>> = if data.polygons.is_empty() {
         (0..points as u32).map(|i| vec![i]).collect()
     } else {
@@ -55,6 +57,7 @@ pub fn write_vtp(path: &Path, data: &PolyData) -> io::Result<()> {
     } else {
         (0, cells)
     };
+
     write_atomically(path, |partial| {
         let mut out = BufWriter::new(File::create(partial)?);
         writeln!(out, "<?xml version=\"1.0\"?>")?;

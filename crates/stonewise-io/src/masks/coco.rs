@@ -109,15 +109,18 @@ impl CocoMasks {
             path: path.to_owned(),
             problem: e.to_string(),
         })?;
+
         if raw.images.is_empty() {
             return Err(MaskError::Empty {
                 path: path.to_owned(),
                 expected: "the file lists no image",
             });
         }
+
         let is_stone = |c: &&RawCategory| c.name.eq_ignore_ascii_case("stone");
         let stones: BTreeSet<u64> = raw.categories.iter().filter(is_stone).map(|c| c.id).collect();
         let mut annotations: BTreeMap<u64, Vec<RawAnnotation>> = BTreeMap::new();
+
         for annotation in raw.annotations {
             if stones.is_empty() || annotation.category_id.is_none_or(|id| stones.contains(&id)) {
                 annotations
@@ -126,6 +129,7 @@ impl CocoMasks {
                     .push(annotation);
             }
         }
+
         Ok(Self {
             path: path.to_owned(),
             images: raw.images,
@@ -163,6 +167,7 @@ impl CocoMasks {
         };
         let mut warnings = Vec::new();
         let mut masks: Vec<(u64, u32, Spans)> = Vec::new();
+
         for (index, annotation) in annotations.iter().enumerate() {
             let spans = self.spans(annotation, width, height)?;
             let area: u64 = spans.iter().map(|&(_, begin, end)| u64::from(end - begin)).sum();
@@ -175,6 +180,7 @@ impl CocoMasks {
                 masks.push((area, index as u32 + 1, spans));
             }
         }
+
         masks.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut labels = Raster::filled(width, height, 0u32);
         for (_, id, spans) in &masks {
@@ -183,11 +189,13 @@ impl CocoMasks {
                 labels.data_mut()[row + begin as usize..row + end as usize].fill(*id);
             }
         }
+
         let mut is_visible = vec![false; annotations.len() + 1];
         for &label in labels.data() {
             is_visible[label as usize] = true;
         }
         let mut instances = Vec::new();
+
         for (index, annotation) in annotations.iter().enumerate() {
             let id = index as u32 + 1;
             if is_visible[index + 1] {
@@ -203,6 +211,7 @@ impl CocoMasks {
                 ));
             }
         }
+
         Ok(Some(LabelledPhoto {
             labels,
             instances,
@@ -225,6 +234,7 @@ impl CocoMasks {
         let Some(annotations) = self.annotations_of(photo_name, (width, height))? else {
             return Ok(None);
         };
+
         let corners = |annotation: &RawAnnotation| {
             let bounds = annotation.bbox.map(|[x, y, w, h]| [x, y, x + w, y + h]);
             let [width, height] = [width, height].map(f64::from);
@@ -243,6 +253,7 @@ impl CocoMasks {
                     .to_owned(),
             })
         };
+
         annotations
             .iter()
             .map(corners)
@@ -300,6 +311,7 @@ impl CocoMasks {
             annotation: annotation.id,
             problem,
         };
+
         let runs = |size: [u32; 2], rle: Rle| {
             if size == [height, width] {
                 Ok(horizontal(&rle))
@@ -310,6 +322,7 @@ impl CocoMasks {
                 )))
             }
         };
+
         match &annotation.segmentation {
             RawSegmentation::Polygons(polygons) => {
                 let mut spans = Spans::new();

@@ -62,12 +62,14 @@ impl LabelFolder {
         let labels = decode_labels(decoder, path)?;
         let ids: BTreeSet<u32> = labels.data().iter().copied().filter(|&id| id != 0).collect();
         let mut warnings = Vec::new();
+
         if ids.len() == 1 && ids.contains(&255) {
             warnings.push(format!(
                 "{} has one instance of value 255: stones need values of their own",
                 path.display()
             ));
         }
+
         let info = |id| InstanceInfo {
             id,
             score: 1.0,

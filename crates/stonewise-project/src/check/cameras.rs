@@ -63,6 +63,7 @@ pub(super) fn look(
     }
     let finding = |verdict, text: Said| vec![Finding::new(&epoch.name, &CAMERAS, verdict, text)];
     let candidates = candidates(photos, survey);
+
     if candidates.is_empty() {
         // Points that were not read may be seen.
         let verdict = match (survey.is_whole(), depth) {
@@ -72,6 +73,7 @@ pub(super) fn look(
         };
         return Ok((finding(verdict, NOT_SEEN.say(&[])), None));
     }
+
     if depth == Depth::Quick {
         let text = match candidates.len() {
             1 => "1 photo sees the cloud".to_owned(),
@@ -79,6 +81,7 @@ pub(super) fn look(
         };
         return Ok((finding(Verdict::Fine, text.into()), None));
     }
+
     let compared: Vec<Compared> = candidates
         .into_iter()
         .filter_map(|(view, path)| compare(view.clone(), &path, survey))
@@ -151,26 +154,31 @@ fn judge(compared: &[Compared], best: &Compared) -> (Verdict, String) {
         );
         return (Verdict::Note, text);
     }
+
     let shift = |c: &Compared| c.shift.length();
     let is_off = |c: &Compared, limit: f64| shift(c) > limit && shift(c) * c.pixel_m > HARMLESS_M;
     let of = |limit: f64| clear.iter().filter(|c| is_off(c, limit)).count();
     let px = best.shift.length() * best.overlay.reduction;
     let mm = 1e3 * best.shift.length() * best.pixel_m;
     let place = format!("{px:.0} px ({mm:.0} mm) off those of photo {}", best.name);
+
     if 2 * of(DOUBTFUL_PX) <= clear.len() {
         let text = format!("the cloud's edges fit best {place}, which light and shade can do");
         return (Verdict::Fine, text);
     }
+
     // In sound surveys of small walls, single photos were seen with clear shifts of metres.
     let off = compared
         .iter()
         .filter(|c| is_off(c, DOUBTFUL_PX) && c.name != best.name);
     let others: Vec<Across> = off.map(|c| c.across).collect();
+
     if is_repeated(best.across, &others) {
         let advice = "and another photo shows the same shift: cameras and clouds are not in one frame, or of different surveys; look at \
                       the picture";
         return (Verdict::Doubt, format!("the cloud's edges lie {place}, {advice}"));
     }
+
     let advice = "and no other photo shows the same shift: this may be chance; look at the picture";
     (Verdict::Note, format!("the cloud's edges lie {place}, {advice}"))
 }

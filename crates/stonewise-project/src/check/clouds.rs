@@ -163,6 +163,7 @@ fn systems(project: &Project, surveys: &[Option<Sample>]) -> Finding {
             }
         }
     }
+
     let topic = &SYSTEM;
     match codes.as_slice() {
         [] => Finding::new("", topic, Verdict::Fine, "none named: a local frame"),
@@ -214,6 +215,7 @@ fn overlap([one, other]: [&str; 2], first: &Bounds, second: &Bounds) -> Finding 
         min: first.min.sup(&second.min),
         max: first.max.inf(&second.max),
     });
+
     if shared.min() < 0.0 {
         let corners = [second.min, second.max, first.min, first.max];
         let place = |p: Point3<f64>| Said::list(&[p.x, p.y, p.z].map(|m| format!("{m:.1}")));
@@ -227,6 +229,7 @@ fn overlap([one, other]: [&str; 2], first: &Bounds, second: &Bounds) -> Finding 
         ]);
         return Finding::new(other, &OVERLAP, Verdict::Wrong, text);
     }
+
     // A wall is thin in one direction: the two longer ones count.
     let face = |v: Vector3<f64>| v.x * v.y + v.y * v.z + v.z * v.x;
     let smaller = face(size(first)).min(face(size(second)));
@@ -246,6 +249,7 @@ fn overlap([one, other]: [&str; 2], first: &Bounds, second: &Bounds) -> Finding 
             format!("{percent} % of the smaller epoch with {one}").into(),
         ),
     };
+
     Finding::new(other, &OVERLAP, verdict, text)
 }
 

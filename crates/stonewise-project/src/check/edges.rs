@@ -47,6 +47,7 @@ impl Edges {
             .zip(&weight)
             .map(|(s, n)| if *n > 0.0 { s / n } else { 0.0 })
             .collect();
+
         let inner: Vec<f32> = near.iter().map(|n| f32::from(u8::from(*n > 0.999))).collect();
         let (mut gx, mut gy) = (vec![0.0; w * h], vec![0.0; w * h]);
         for y in 1..h.saturating_sub(1) {
@@ -56,6 +57,7 @@ impl Edges {
                 gy[i] = (smoothed[i + w] - smoothed[i - w]) * inner[i];
             }
         }
+
         let share = box_mean(&inner, w, h, SLOPE_WINDOW);
         for g in [&mut gx, &mut gy] {
             let mean = box_mean(g, w, h, SLOPE_WINDOW);
@@ -63,15 +65,18 @@ impl Edges {
                 g[i] = (g[i] - mean[i] / share[i].max(1e-3)) * inner[i];
             }
         }
+
         let limit = strong(&gx, &gy, &inner);
         let mut vectors: Vec<[f32; 2]> = gx.iter().zip(&gy).map(|(x, y)| doubled(*x, *y, limit)).collect();
         let power: Vec<f32> = vectors.iter().map(|v| v[0] * v[0] + v[1] * v[1]).collect();
         let least = (power.iter().sum::<f32>() / power.len().max(1) as f32).sqrt() * 1e-2;
         let local = box_mean(&power, w, h, CONTRAST_WINDOW);
+
         for (v, p) in vectors.iter_mut().zip(local) {
             let scale = 1.0 / p.max(0.0).sqrt().max(least).max(1e-12);
             *v = [v[0] * scale, v[1] * scale];
         }
+
         Self {
             width: w,
             height: h,

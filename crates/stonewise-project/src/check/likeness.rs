@@ -88,14 +88,17 @@ pub(super) fn look(
             Ok(photo.and_then(|photo| seen(&points, view, &photo, scale)))
         })
         .collect::<Result<Vec<_>>>()?;
+
     let (flat, photos): (Vec<Seen>, Vec<Seen>) = photos.into_iter().flatten().partition(|seen| seen.is_flat);
     let doubt = |text| Finding::new(&epoch.name, &PHOTOS, Verdict::Doubt, text);
     let names = |photos: &[&Seen]| some(&photos.iter().map(|p| p.name.clone()).collect::<Vec<_>>());
     let mut found = Vec::new();
+
     if !flat.is_empty() {
         let flat: Vec<&Seen> = flat.iter().collect();
         found.push(doubt(FLAT_PHOTOS.say(&[("photos", names(&flat).into())])));
     }
+
     let likenesses = likenesses(&photos);
     let best: Vec<Option<f64>> = (0..photos.len())
         .map(|i| {
@@ -105,6 +108,7 @@ pub(super) fn look(
         })
         .collect();
     let least = best.iter().copied().flatten().min_by(f64::total_cmp);
+
     match (judge(&likenesses), least) {
         (Judgement::Sound, None) => {}
         (Judgement::Sound, Some(least)) if least < UNLIKE => {
@@ -130,6 +134,7 @@ pub(super) fn look(
             found.push(doubt(UNLIKE_PHOTOS.say(&values)));
         }
     }
+
     Ok(found)
 }
 
@@ -172,6 +177,7 @@ fn seen(points: &[Point3<f64>], view: &View, photo: &RgbImage, scale: Scale) -> 
             Some((at, pixel, seen.depth_m))
         })
         .collect();
+
     let value = |seen: Option<(usize, usize, f64)>| match seen {
         Some((at, pixel, depth_m)) if depth_m < nearest[at] + 2.0 * scale.cell_m => grey.values[pixel],
         _ => f32::NAN,

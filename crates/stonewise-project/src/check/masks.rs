@@ -27,10 +27,12 @@ pub(super) fn look(epoch: &Epoch, photos: &[PosedPhoto], progress: &dyn Progress
         return Ok(Vec::new());
     };
     let source = MaskSource::open(file)?;
+
     // That no photo is there is said elsewhere.
     if photos.is_empty() {
         return Ok(Vec::new());
     }
+
     let of_photo = |(view, path): &PosedPhoto| {
         progress.check()?;
         let size = (view.camera.width, view.camera.height);
@@ -41,11 +43,13 @@ pub(super) fn look(epoch: &Epoch, photos: &[PosedPhoto], progress: &dyn Progress
         };
         Ok::<_, Error>(masks)
     };
+
     let masks = photos.par_iter().map(of_photo).collect::<Result<Vec<_>>>()?;
     let file = file.to_string_lossy();
     let finding = |verdict, text: Said| Finding::new(&epoch.name, &MASKS, verdict, text);
     let (mut found, mut missing, mut broken) = (Vec::new(), Vec::new(), Vec::new());
     let mut there = 0;
+
     for masks in masks {
         match masks {
             Masks::There => there += 1,
@@ -53,10 +57,12 @@ pub(super) fn look(epoch: &Epoch, photos: &[PosedPhoto], progress: &dyn Progress
             Masks::Broken(photo, reason) => broken.push((photo, reason)),
         }
     }
+
     if there == 0 && broken.is_empty() {
         let text = NO_MASK_FITS.say(&[("file", (&*file).into())]);
         return Ok(vec![finding(Verdict::Unreadable, text)]);
     }
+
     if let Some((_, reason)) = broken.first() {
         let photos: Vec<String> = broken.iter().map(|(photo, _)| photo.clone()).collect();
         let text = BROKEN_MASKS.say(&[("photos", some(&photos).into()), ("reason", (&**reason).into())]);
@@ -66,15 +72,18 @@ pub(super) fn look(epoch: &Epoch, photos: &[PosedPhoto], progress: &dyn Progress
         };
         found.push(finding(verdict, text));
     }
+
     if !missing.is_empty() {
         let text = WITHOUT_MASKS.say(&[("file", (&*file).into()), ("photos", some(&missing).into())]);
         found.push(finding(Verdict::Doubt, text));
     }
+
     if found.is_empty() {
         found.push(finding(
             Verdict::Fine,
             format!("there for every photo ({there})").into(),
         ));
     }
+
     Ok(found)
 }

@@ -44,6 +44,7 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
     let mut unreadable = Unreadable::new(depth);
     let mut surveys = Vec::new();
     let mut searched = Vec::new();
+
     for epoch in &project.epochs {
         progress.check()?;
         let survey = sample::sample(epoch, depth, &mut unreadable)?;
@@ -85,15 +86,18 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
         surveys.push(survey);
         progress.advance(1);
     }
+
     report.findings.extend(unreadable.findings);
     report.findings.extend(clouds::look(project, &surveys));
     report.findings.extend(repeats::look(project, &surveys));
     report.findings.extend(stable::look(project, &surveys));
+
     if surveys.iter().all(Option::is_some) {
         report
             .findings
             .extend(resources::look(project, &surveys, &searched, depth, out));
     }
+
     report.sort(project);
     Ok(report)
 }

@@ -41,6 +41,7 @@ impl Report {
                 ]
             })
             .collect();
+
         page.html(&words(&["epoch", "what", "verdict", "finding"], &rows));
         if !self.pictures.is_empty() {
             page.heading("Cameras against clouds").note(
@@ -48,6 +49,7 @@ impl Report {
                  joints and rims that the photo shows.",
             );
         }
+
         for picture in &self.pictures {
             page.figure(&picture.caption, &jpeg_element(&picture.jpeg, &picture.caption));
         }

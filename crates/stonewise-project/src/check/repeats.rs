@@ -79,6 +79,7 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
         }
         earlier.push((&epoch.name, &survey.points, cells));
     }
+
     found
 }
 

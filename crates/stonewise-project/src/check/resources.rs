@@ -78,6 +78,7 @@ fn time(project: &Project, points: u64, photos: &[[u32; 2]], tile: f64) -> Strin
         true => SECONDS_PER_POINT,
         false => SECONDS_PER_POINT_WITHOUT_PHOTOS,
     };
+
     // Enlarged photos are looked at in few places.
     let mut tiling = project.settings.segment.tiling.clone();
     tiling.scales.retain(|scale| *scale <= 1.0);
@@ -94,6 +95,7 @@ fn time(project: &Project, points: u64, photos: &[[u32; 2]], tile: f64) -> Strin
         true => ", plus the search for stones in views of the clouds",
         false => "",
     };
+
     let minutes = |factor: f64| (seconds * factor / 60.0).round().max(1.0);
     let (low, high) = (minutes(1.0 / SPREAD), minutes(SPREAD));
     match low < high {

@@ -137,12 +137,14 @@ impl Edit {
             ("outline", self.outline.len()),
             ("box", self.corners.len()),
         ];
+
         let fits = |key: &str| match self.action {
             Action::Merge | Action::Delete => key == "at" || key == "outline",
             Action::Split => key == "line" || key == "outline",
             Action::Add => key == "outline" || key == "box",
             Action::Ignore => key == "outline",
         };
+
         let wanted = match self.action {
             Action::Merge => {
                 "\"at\" with a place [x, y] in each of its stones, two at least, or an \"outline\" around them"
@@ -160,6 +162,7 @@ impl Edit {
             ("outline", _) => 3,
             _ => 2,
         };
+
         let [(key, vertices)] = present[..] else {
             return Some(format!("{word} needs {wanted}, and no other shape"));
         };
@@ -169,6 +172,7 @@ impl Edit {
             return Some(format!("{word} needs {wanted}"));
         }
         let shape = self.shape();
+
         if shape
             .iter()
             .flatten()
@@ -179,14 +183,17 @@ impl Edit {
                 "a coordinate beyond {MAX_COORDINATE}: shapes are in {frame}"
             ));
         }
+
         if self.photo.is_some() && key == "box" {
             return Some("a \"box\" lies on the wall: leave out \"photo\"".to_owned());
         }
+
         if self.photo.is_none() && self.epoch.is_some() {
             return Some(
                 "\"epoch\" belongs to \"photo\"; \"epochs\" says which epochs it changes".to_owned(),
             );
         }
+
         self.mistake_in_outline().or_else(|| self.mistake_in_signature())
     }
 
@@ -249,6 +256,7 @@ impl EditsFile {
                 "a file of edits is an object with \"format\" and \"edits\"".to_owned(),
             )
         })?;
+
         if let Some(key) = root
             .keys()
             .find(|k| !["format", "facade", "edits"].contains(&k.as_str()))
@@ -258,6 +266,7 @@ impl EditsFile {
                 format!("unknown key {key:?}: known are format, facade, edits"),
             ));
         }
+
         if root.get("format").and_then(Value::as_u64) != Some(u64::from(FORMAT)) {
             return Err(at(1, format!("\"format\" must be {FORMAT}")));
         }
@@ -271,6 +280,7 @@ impl EditsFile {
             .ok_or_else(|| at(1, "\"edits\" must be a list".to_owned()))?;
         let lines = object_lines(&text);
         let mut edits = Vec::new();
+
         for (number, value) in (1..).zip(list) {
             let line = lines.get(number - 1).copied().unwrap_or(1);
             let wrong = |message: String| at(line, format!("edit {number}: {message}"));
@@ -280,6 +290,7 @@ impl EditsFile {
             }
             edits.push(edit);
         }
+
         Ok(Self {
             path: path.to_path_buf(),
             facade,

@@ -56,11 +56,13 @@ pub(super) fn edits(path: &Path, epoch: Option<&str>, signed: &Signed) -> Result
         let word = Value::from(c.name.to_lowercase());
         Some((c.id, Action::deserialize(&word).ok()?))
     };
+
     let actions: BTreeMap<u64, Action> = file.categories.iter().filter_map(action).collect();
     if actions.is_empty() {
         let wanted = "name categories merge, split, delete, add or ignore";
         return Err(wrong(format!("none of its categories is an edit: {wanted}")));
     }
+
     let (mut edits, mut others) = (Vec::new(), 0);
     for annotation in &file.annotations {
         let Some(&action) = actions.get(&annotation.category_id) else {
@@ -93,6 +95,7 @@ pub(super) fn edits(path: &Path, epoch: Option<&str>, signed: &Signed) -> Result
             });
         }
     }
+
     let note = format!("annotations of other categories, which are no edits: {others}");
     Ok((edits, (others > 0).then_some(note).into_iter().collect()))
 }

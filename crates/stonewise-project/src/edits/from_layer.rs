@@ -47,6 +47,7 @@ pub(super) fn edits(path: &Path, results: &ResultSet, signed: &Signed) -> Result
         .collect();
     let mut notes = Vec::new();
     let mut shapes = Vec::new();
+
     for feature in read_polygons(path, LAYER)? {
         let holes: usize = feature.polygons.iter().map(|p| p.len().saturating_sub(1)).sum();
         if holes > 0 {
@@ -62,6 +63,7 @@ pub(super) fn edits(path: &Path, results: &ResultSet, signed: &Signed) -> Result
             attributes: feature.attributes,
         });
     }
+
     let mut comparison = Comparison {
         known: &known,
         shapes: &shapes,
@@ -95,11 +97,13 @@ impl Comparison<'_> {
         };
         let (areas, stones): (Vec<&Shape>, Vec<&Shape>) = shapes.iter().partition(is_area);
         let mut parts: BTreeMap<u32, Vec<&Shape>> = known.keys().map(|id| (*id, Vec::new())).collect();
+
         for shape in stones.iter().filter(|s| !s.rings.is_empty()) {
             if let Some(list) = shape.stone.and_then(|id| parts.get_mut(&id)) {
                 list.push(shape);
             }
         }
+
         let gone: BTreeSet<u32> = parts.iter().filter(|p| p.1.is_empty()).map(|p| *p.0).collect();
         let mut taken = BTreeSet::new();
         // Stones that another polygon holds now.
@@ -118,6 +122,7 @@ impl Comparison<'_> {
                 self.reshape(id, shape);
             }
         }
+
         for &id in gone.difference(&taken) {
             let anybody = self.signature(None);
             self.edits.push(Edit {
@@ -125,6 +130,7 @@ impl Comparison<'_> {
                 ..anybody.edit(Action::Delete)
             });
         }
+
         let merged: BTreeSet<i64> = stones
             .iter()
             .filter(|s| taken.iter().any(|id| share(&known[id].rings, &s.rings) > HELD))
@@ -133,6 +139,7 @@ impl Comparison<'_> {
         for (id, parts) in &parts {
             self.compare_parts(*id, parts, &stones, &merged);
         }
+
         for shape in stones
             .iter()
             .filter(|s| s.stone.is_none() && !merged.contains(&s.fid))
@@ -147,6 +154,7 @@ impl Comparison<'_> {
             };
             self.push_outlines(action, shape);
         }
+
         for shape in areas {
             self.push_outlines(Action::Ignore, shape);
         }

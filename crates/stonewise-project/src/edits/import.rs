@@ -58,6 +58,7 @@ pub fn import(
         }
         from_layer::edits(source, &results, signed)?
     };
+
     if let Some((index, message)) = edits
         .iter()
         .enumerate()
@@ -68,6 +69,7 @@ pub fn import(
             message: format!("edit {}, {}: {message}", index + 1, edits[index].action.word()),
         });
     }
+
     let new = edits.len();
     file.edits.extend::<Vec<Edit>>(edits);
     Ok(Imported { file, new, notes })

@@ -42,6 +42,7 @@ pub(super) fn halves_edits(
         ..EditsFile::empty(path)
     };
     let mut left_out = Vec::new();
+
     for (index, edit) in given.edits.iter().enumerate() {
         if !edit.concerns(&epoch.name) {
             continue;
@@ -67,6 +68,7 @@ pub(super) fn halves_edits(
         }
         file.edits.push(edit);
     }
+
     Ok(Some(HalvesEdits { file, left_out }))
 }
 

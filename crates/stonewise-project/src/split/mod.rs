@@ -63,6 +63,7 @@ pub fn split(
             message,
         });
     }
+
     let edits = halves_edits(project, epoch, &photos, &out.join(EDITS))?;
     let mut text = head(project, epoch)?;
     for half in 0..2 {
@@ -72,15 +73,18 @@ pub fn split(
         let clouds = write_clouds(epoch, half, seed, out, progress)?;
         text += &epoch_table(epoch, half, &clouds)?;
     }
+
     text.push_str(
         "# motion = { kind = \"translation\", d = [0.0, 0.02, 0.05] }   # moves the points of half 2 after labelling\n",
     );
     let mut left_out = Vec::new();
+
     if let Some(edits) = edits {
         edits.file.write()?;
         let _ = write!(text, "\n[edits]\nfile = {}\n", quoted(EDITS));
         left_out = edits.left_out;
     }
+
     let path = out.join("stonewise.toml");
     write_text(&path, &text)?;
     Ok(Halves {

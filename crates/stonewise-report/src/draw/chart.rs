@@ -39,10 +39,12 @@ pub(crate) fn scatter(key: &str, title: &str, [x, y]: [Axis; 2], series: &[Serie
         r#"<svg role="img" aria-label="{}" viewBox="0 0 384 370"{live}>"#,
         escape(title)
     );
+
     axes.draw(&mut out);
     if let Some(zero) = zero_lines(&axes) {
         let _ = write!(out, r#"<path class="zero" d="{zero}"/>"#);
     }
+
     if matches!(guide, Guide::Diagonal) {
         let ([x0, x1], [y0, y1]) = (axes.x.range, axes.y.range);
         let (low, high) = (x0.max(y0), x1.min(y1));
@@ -52,6 +54,7 @@ pub(crate) fn scatter(key: &str, title: &str, [x, y]: [Axis; 2], series: &[Serie
             r#"<path class="diagonal" d="M{x0:.1} {y0:.1}L{x1:.1} {y1:.1}"/>"#
         );
     }
+
     for s in series {
         let _ = write!(
             out,
@@ -60,6 +63,7 @@ pub(crate) fn scatter(key: &str, title: &str, [x, y]: [Axis; 2], series: &[Serie
             dots(&s.points, &axes)
         );
     }
+
     if let Guide::Cross([x, y]) = guide {
         let (x, y) = (axes.px(x), axes.py(y));
         // Open in the middle, so that points on the truth stay visible.
@@ -69,6 +73,7 @@ pub(crate) fn scatter(key: &str, title: &str, [x, y]: [Axis; 2], series: &[Serie
             r#"<path class="cross halo" d="{d}"/><path class="cross" d="{d}"/>"#
         );
     }
+
     out.push_str("</svg>");
     out
 }
@@ -80,10 +85,12 @@ pub(crate) fn histogram(title: &str, x: Axis, counted: &str, values: &[f64]) -> 
     let [low, high] = x.range;
     let span = high - low;
     let mut bars = [0usize; BARS];
+
     for v in values.iter().filter(|v| v.is_finite()) {
         let place = (v - low) / span * BARS as f64;
         bars[(place.max(0.0) as usize).min(BARS - 1)] += 1;
     }
+
     let highest = bars.iter().copied().max().unwrap_or(0).max(1) as f64;
     let axes = Axes {
         y: Axis {
@@ -98,6 +105,7 @@ pub(crate) fn histogram(title: &str, x: Axis, counted: &str, values: &[f64]) -> 
         escape(title)
     );
     axes.draw(&mut out);
+
     let mut path = String::new();
     for (i, n) in bars.iter().enumerate().filter(|(_, n)| **n > 0) {
         let [a, b] = [i, i + 1].map(|i| axes.px(low + span * i as f64 / BARS as f64));
@@ -111,6 +119,7 @@ pub(crate) fn histogram(title: &str, x: Axis, counted: &str, values: &[f64]) -> 
             axes.py(0.0)
         );
     }
+
     let _ = write!(out, r#"<path class="bars" d="{path}"/>"#);
     if let Some(zero) = zero_lines(&axes) {
         let _ = write!(out, r#"<path class="zero" d="{zero}"/>"#);

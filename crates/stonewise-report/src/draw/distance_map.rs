@@ -30,20 +30,24 @@ pub(crate) fn distance_map(layout: &MapLayout, results: &ResultSet, scale: Scale
         .collect();
     let cell = (CELL_SPACINGS * spacing(&inside, width * height)).clamp(CELL_PX[0], CELL_PX[1]);
     let mut cells: BTreeMap<(i64, i64), (Vec<f64>, Vec<f64>)> = BTreeMap::new();
+
     for (x, y, i) in inside {
         let entry = cells.entry(((y / cell) as i64, (x / cell) as i64)).or_default();
         entry.0.push(results.distances[i].distance_m);
         entry.1.push(results.distances[i].detection_limit_m);
     }
+
     if cells.is_empty() {
         return None;
     }
     let mut medians: BTreeMap<(i64, i64), [f64; 2]> = BTreeMap::new();
+
     for (place, (distances, limits)) in cells {
         if let Some(distance) = Sorted::new(distances).median() {
             medians.insert(place, [distance, Sorted::new(limits).median().unwrap_or(0.0)]);
         }
     }
+
     (0..FILLS).for_each(|_| fill_gaps(&mut medians));
     let mut groups: BTreeMap<(bool, i32), String> = BTreeMap::new();
     for ((row, column), [distance, limit]) in medians {
@@ -54,13 +58,16 @@ pub(crate) fn distance_map(layout: &MapLayout, results: &ResultSet, scale: Scale
         let (w, h) = (edge(left, column + 1) - x, edge(top, row + 1) - y);
         let _ = write!(path, "M{x} {y}h{w}v{h}h-{w}z");
     }
+
     let mut out = layout.open(layout.texts().maps.m3c2);
     layout.axes.draw(&mut out);
     out.push_str(r#"<g transform="scale(.1)" shape-rendering="crispEdges">"#);
+
     for ((shown, step), path) in groups {
         let class = if shown { "" } else { r#" class="faded""# };
         let _ = write!(out, r#"<path{class} fill="{}" d="{path}"/>"#, scale.colour(step));
     }
+
     out.push_str("</g>");
     layout.draw_bar(&mut out, scale, "mm");
     out.push_str("</svg>");

@@ -43,17 +43,20 @@ pub(crate) fn path_chart(chart: &PathChart) -> String {
     let times = chart.times();
     let heights = chart.heights_mm();
     let mut top = 6.0;
+
     let mut axes = |y: Axis, height: f64| {
         let area = [SIDES[0], top, WIDTH - SIDES[0] - SIDES[1], height];
         top += height + beneath;
         let x = chart.texts.axis("", times);
         Axes { x, y, area }
     };
+
     for (component, label) in chart.labels.iter().enumerate() {
         let axes = axes(chart.texts.axis(label, heights), motion);
         axes.draw(&mut out);
         chart.draw_motion(&axes, component, &mut out);
     }
+
     for record in chart.conditions {
         let readings: Vec<[f64; 2]> = record
             .readings
@@ -78,6 +81,7 @@ pub(crate) fn path_chart(chart: &PathChart) -> String {
             .collect();
         let _ = write!(out, r#"<path class="dots a" d="{}"/>"#, dots(&axes, &epochs));
     }
+
     out.push_str("</svg>");
     out
 }
@@ -140,6 +144,7 @@ impl PathChart<'_> {
             .iter()
             .flat_map(|mm| [-mm, *mm])
             .filter(|mm| axes.y.holds(*mm));
+
         for mm in lines {
             let _ = write!(
                 out,
@@ -147,15 +152,18 @@ impl PathChart<'_> {
                 axes.py(mm)
             );
         }
+
         let joins = |a: &CurvePoint, b: &CurvePoint| {
             let near = year_of(&a.date)
                 .zip(year_of(&b.date))
                 .is_some_and(|(a, b)| are_near(a, b));
             near && a.extrapolated == b.extrapolated
         };
+
         let at = |date: &str, e: &EstimateRecord, z: f64| {
             Some([year_of(date)?, 1e3 * (e.value[component] + z * e.sd[component])])
         };
+
         for run in self.zone.curve.chunk_by(joins) {
             let side =
                 |z: f64| -> Vec<[f64; 2]> { run.iter().filter_map(|p| at(&p.date, &p.model, z)).collect() };
@@ -172,6 +180,7 @@ impl PathChart<'_> {
                 line(axes, &side(0.0))
             );
         }
+
         if self.zone.curve.is_empty() {
             let model: Vec<[f64; 2]> = self
                 .zone
@@ -181,6 +190,7 @@ impl PathChart<'_> {
                 .collect();
             let _ = write!(out, r#"<path class="curve beyond" d="{}"/>"#, line(axes, &model));
         }
+
         let mut measured = Vec::new();
         for point in &self.zone.path {
             let Some(shown) = &point.measured else { continue };
@@ -194,6 +204,7 @@ impl PathChart<'_> {
                 measured.push(middle);
             }
         }
+
         let _ = write!(out, r#"<path class="dots a" d="{}"/>"#, dots(axes, &measured));
     }
 }

@@ -61,6 +61,7 @@ impl<'a> MapLayout<'a> {
                 .flatten()
                 .filter(|p| p.x.is_finite() && p.y.is_finite())
         };
+
         let low = all()
             .copied()
             .reduce(|a, b| a.inf(&b))
@@ -74,6 +75,7 @@ impl<'a> MapLayout<'a> {
         let width = if size.x > 2.0 * size.y { 1240.0 } else { 620.0 };
         let scale = ((width - MARGIN[0] - MARGIN[2]) / size.x).min(MAX_HEIGHT / size.y);
         let area = [MARGIN[0], MARGIN[1], size.x * scale, size.y * scale];
+
         // A long label does not fit beside a low wall.
         let up = if area[3] < 110.0 {
             texts.maps.axis_up_short
@@ -89,6 +91,7 @@ impl<'a> MapLayout<'a> {
             area[2] + MARGIN[0] + MARGIN[2],
             area[3].max(60.0) + MARGIN[1] + MARGIN[3],
         );
+
         let area_m2 = Sorted::new(results.stones.iter().map(|s| s.area_m2))
             .median()
             .unwrap_or(0.0);
@@ -157,6 +160,7 @@ pub(crate) fn joint_map(
         r#"<g transform="scale(.1)"><path class="plain" d="{all}"/></g>"#
     );
     let mut groups: BTreeMap<(bool, i32), String> = BTreeMap::new();
+
     for (line, opening, significant) in joints {
         let [x0, y0, x1, y1] = [
             layout.axes.px(line[0].x),
@@ -167,6 +171,7 @@ pub(crate) fn joint_map(
         let path = groups.entry((*significant, scale.step(*opening))).or_default();
         let _ = write!(path, "M{x0:.1} {y0:.1}L{x1:.1} {y1:.1}");
     }
+
     let width = (layout.stone_px * 0.09).clamp(0.8, 4.0);
     for ((shown, step), path) in groups {
         let class = if shown { "joint" } else { "joint faded" };
@@ -176,6 +181,7 @@ pub(crate) fn joint_map(
             scale.colour(step)
         );
     }
+
     layout.draw_bar(&mut out, scale, "mm");
     out.push_str("</svg>");
     out
@@ -189,6 +195,7 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
     // Stones of one colour are one path: fewer elements, smaller file.
     let mut groups: BTreeMap<(bool, i32), String> = BTreeMap::new();
     let (mut unknown, mut loose) = (String::new(), String::new());
+
     for (stone, path) in layout.results.stones.iter().zip(&layout.paths) {
         match (picture.value)(stone).filter(|v| v.is_finite()) {
             None => unknown.push_str(path),
@@ -204,12 +211,14 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
             loose.push_str(path);
         }
     }
+
     if !unknown.is_empty() {
         let _ = write!(
             out,
             r#"<path class="unknown" d="{unknown}"/><path class="hatch" d="{unknown}"/>"#
         );
     }
+
     for ((shown, step), path) in groups {
         let class = if shown { "" } else { r#" class="faded""# };
         let _ = write!(
@@ -218,6 +227,7 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
             picture.scale.colour(step)
         );
     }
+
     let maps = &layout.texts.maps;
     mark(&mut out, layout, "carried", ["10 20", maps.carried], |stone| {
         stone.carried_from.is_some()
@@ -225,6 +235,7 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
     mark(&mut out, layout, "edited", ["40 30", maps.edited], |stone| {
         stone.edited.is_some()
     });
+
     if !loose.is_empty() {
         // Small stones get thin outlines.
         let width = (layout.stone_px * 0.8).clamp(4.0, 18.0);
@@ -234,6 +245,7 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
             2.2 * width
         );
     }
+
     out.push_str("</g>");
     if picture.arrows {
         draw_arrows(layout, picture.strong.is_some(), &mut out);
@@ -272,6 +284,7 @@ fn path(ring: &[Point2<f64>], axes: &Axes) -> String {
             (axes.py(p.y) * 10.0).round() as i64,
         )
     };
+
     let mut out = String::new();
     let Some(first) = ring
         .first()
@@ -282,6 +295,7 @@ fn path(ring: &[Point2<f64>], axes: &Axes) -> String {
     let mut last = to_px(first);
     let _ = write!(out, "M{} {}l", last.0, last.1);
     let mut steps = 0;
+
     for p in &ring[1..] {
         let next = to_px(p);
         let (dx, dy) = (next.0 - last.0, next.1 - last.1);
@@ -294,6 +308,7 @@ fn path(ring: &[Point2<f64>], axes: &Axes) -> String {
         let _ = write!(out, "{space}{dx}{comma}{dy}");
         (last, steps) = (next, steps + 1);
     }
+
     if steps < 2 {
         return String::new();
     }
@@ -320,6 +335,7 @@ fn draw_arrows(layout: &MapLayout, only_significant: bool, out: &mut String) {
                 .then_some(arrow)
         })
         .collect();
+
     let lengths = Sorted::new(arrows.iter().map(|a| a.1[0].hypot(a.1[1])));
     let Some(longest) = lengths.quantile(0.98).filter(|l| *l > 0.0) else {
         return;
@@ -327,12 +343,14 @@ fn draw_arrows(layout: &MapLayout, only_significant: bool, out: &mut String) {
     let reference_m = nice_above(longest * 1e3) / 1e3;
     let px_per_m = ARROW_PX / reference_m;
     let (mut shafts, mut taken) = (String::new(), BTreeSet::new());
+
     for (at, d) in arrows {
         let cell = at.map(|v| (v / ARROW_SPACING_PX) as i64);
         if taken.insert(cell) {
             shafts.push_str(&arrow(at, [d[0] * px_per_m, -d[1] * px_per_m]));
         }
     }
+
     let left = layout.axes.area[0] + 4.0;
     let bottom = layout.height - 8.0;
     let reference = arrow([left, bottom], [ARROW_PX, 0.0]);

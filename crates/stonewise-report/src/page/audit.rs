@@ -135,12 +135,14 @@ fn decision_list(rows: &[Vec<String>], number: usize, names: &AuditTexts) -> Str
     if rows.is_empty() {
         return String::new();
     }
+
     let text = |row: &Vec<String>| {
         let mut cells: Vec<String> = row.iter().map(|c| escape(c)).collect();
         cells.resize(6, String::new());
         cells[0] = escape(&decision(&row[0], names));
         cells
     };
+
     let shown: Vec<Vec<String>> = rows.iter().take(MAX_DECISIONS).map(text).collect();
     let rest = if rows.len() > MAX_DECISIONS {
         let values = [
@@ -160,6 +162,7 @@ fn decision_list(rows: &[Vec<String>], number: usize, names: &AuditTexts) -> Str
         names.share,
         names.points,
     ];
+
     details(
         &fill(
             names.decision_list,

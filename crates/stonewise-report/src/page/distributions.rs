@@ -26,6 +26,7 @@ pub(super) fn distributions(
     let texts = facts.texts();
     let names = &texts.charts;
     let mut grid = String::new();
+
     for (name, component) in directions(names).iter().zip(&facts.components) {
         let values: Vec<f64> = component.values().iter().map(|v| v * 1e3).collect();
         let title = fill(names.displacement, &[("direction", *name)]);
@@ -40,6 +41,7 @@ pub(super) fn distributions(
             "",
         ));
     }
+
     let out_of_plane = compared.out_of_plane(results);
     let stones: Vec<[f64; 2]> = facts
         .measured
@@ -54,6 +56,7 @@ pub(super) fn distributions(
     };
     let axes = |[x, y]: [&str; 2], [across, up]: [[f64; 2]; 2]| [texts.axis(x, across), texts.axis(y, up)];
     let labels = [names.axis_along, names.axis_up];
+
     let plot = |key, title: &str, class, points: &Vec<[f64; 2]>| {
         let series = [Series {
             class,
@@ -62,11 +65,13 @@ pub(super) fn distributions(
         let guide = truth_mm.map_or(Guide::None, Guide::Cross);
         scatter(key, title, axes(labels, limits), &series, guide)
     };
+
     grid.push_str(&figure(
         names.stones_title,
         &plot("in-plane", names.stones_title, "a", &stones),
         &note(stones.len(), names.stones),
     ));
+
     if !vectors.is_empty() {
         let text = note(vectors.len(), names.m3c2);
         grid.push_str(&figure(
@@ -75,6 +80,7 @@ pub(super) fn distributions(
             &text,
         ));
     }
+
     if !out_of_plane.is_empty() {
         let pairs: Vec<[f64; 2]> = out_of_plane.iter().map(|d| d.map(|v| v * 1e3)).collect();
         let limits = shared_limits(&[&pairs]);
@@ -98,6 +104,7 @@ pub(super) fn distributions(
         );
         grid.push_str(&figure(names.out_title, &picture, &text));
     }
+
     section(
         "distributions",
         texts.sections.distributions,
@@ -149,6 +156,7 @@ pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
             iter::once(directions(names)[k].to_owned()).chain(cells).collect()
         })
         .collect();
+
     let head = [
         names.direction,
         names.all_median,
@@ -164,6 +172,7 @@ pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
         true => [names.datum_below.to_owned(), fill(names.nmad_below, &values)],
         false => [String::new(), String::new()],
     };
+
     let body = format!(
         "<p>{}{below}</p><p>{}</p>{}<p class=\"note\">{}{nmad_below}</p>",
         names.datum,

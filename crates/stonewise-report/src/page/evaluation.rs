@@ -22,11 +22,13 @@ pub(super) fn evaluation(evaluation: &Evaluation, texts: &Texts) -> String {
         "<p>{}</p>",
         fill(names.truth, &[("truth", &*escape(&evaluation.truth))])
     );
+
     if !methods.is_empty() {
         let _ = write!(out, "<h3>{}</h3>", names.rmse_title);
         out.push_str(&rmse_table(&methods, texts));
         let _ = write!(out, "<p class=\"note\">{}</p>", names.rmse_note);
     }
+
     for (name, score) in &methods {
         out.push_str(&statistics(name, score, texts));
     }
@@ -60,18 +62,21 @@ fn rmse_table(methods: &[(&str, &MotionScore)], texts: &Texts) -> String {
     let mut head = vec![names.method];
     head.extend(in_mm.iter().map(String::as_str));
     head.push(names.count);
+
     let cells = |score: &MotionScore, of: fn(&ErrorStatistics) -> f64| -> Vec<String> {
         directions(names)[2..]
             .iter()
             .map(|(_, pick)| mm(pick(&score.errors).map_or(f64::NAN, of), texts))
             .collect()
     };
+
     let row = |name: &str, score: &MotionScore, of: fn(&ErrorStatistics) -> f64| {
         let mut row = vec![escape(name)];
         row.extend(cells(score, of));
         row.push(count(score.estimated));
         row
     };
+
     let mut rows: Vec<Vec<String>> = methods
         .iter()
         .map(|(name, score)| row(name, score, |s| s.rmse_m))
@@ -86,6 +91,7 @@ fn rmse_table(methods: &[(&str, &MotionScore)], texts: &Texts) -> String {
         let title = fill(names.zero, &[("method", &*name)]);
         row(&title, score, |s| s.zero_predictor_rmse_m)
     }));
+
     table(&head, &rows, 1)
 }
 
@@ -98,12 +104,14 @@ fn statistics(name: &str, score: &MotionScore, texts: &Texts) -> String {
         .as_ref()
         .or(score.calibration_without_datum.as_ref());
     let covered = |of: fn(&Coverage) -> Option<f64>| share(calibration.and_then(|c| of(&c.coverage_95)));
+
     let coverage = |i: usize| match i {
         0 => covered(|c| c.along),
         1 => covered(|c| c.up),
         4 => covered(|c| c.out),
         _ => String::new(),
     };
+
     let head = [
         names.direction,
         names.rmse,
@@ -135,6 +143,7 @@ fn statistics(name: &str, score: &MotionScore, texts: &Texts) -> String {
             ])
         })
         .collect();
+
     let values = [
         ("method", &*escape(name)),
         ("n", &*count(score.estimated)),
@@ -151,10 +160,12 @@ fn statistics(name: &str, score: &MotionScore, texts: &Texts) -> String {
         ("detectable", &*count(s.detectable)),
         ("hit_rate", &*share(s.detectable_hit_rate)),
     ];
+
     let _ = write!(out, "<p class=\"note\">{}", fill(names.significance, &values));
     if let Some(chi) = calibration.and_then(|c| c.chi_square_median) {
         out.push_str(&fill(names.chi, &[("chi", &*texts.number(chi, 2))]));
     }
+
     if let Some(loose) = &score.loose {
         let values = [
             ("true", &*count(loose.truly_loose)),
@@ -163,6 +174,7 @@ fn statistics(name: &str, score: &MotionScore, texts: &Texts) -> String {
         ];
         out.push_str(&fill(names.loose, &values));
     }
+
     out.push_str("</p>");
     out
 }

@@ -89,6 +89,7 @@ fn crop_block(results: &ResultSet, epoch: usize) -> Block {
             .iter()
             .map(|c| rows.get(&c.stone_id).copied().unwrap_or(u32::MAX)),
     );
+
     block.u32("photo", stored.crops.iter().map(|c| photo(&c.photo) as u32));
     block.i16("half", MILLIMETRE, stored.crops.iter().map(|c| c.half_m));
     let rings = stored.crops.iter().scan(0u32, |end, c| {
@@ -104,6 +105,7 @@ fn crop_block(results: &ResultSet, epoch: usize) -> Block {
             *end += ring.len() as u32;
             Some(*end)
         });
+
     block.u32("ringEnd", ends);
     let vertices = stored.crops.iter().flat_map(|c| &c.rings).flatten().flatten();
     block.i16("ring", TENTH_PX, vertices.map(|v| f64::from(*v)));

@@ -263,6 +263,7 @@ fn zones(facts: &Summary) -> String {
     if facts.verdict.zones.is_empty() {
         return String::new();
     }
+
     let row = |zone: &stonewise_results::records::ZoneVerdict| {
         let largest = zone.area.largest.filter(|_| facts.verdict.is_sound());
         let moved = match facts.verdict.is_sound() {
@@ -278,6 +279,7 @@ fn zones(facts: &Summary) -> String {
             texts.mm_or_dash(largest.map(|l| l.length_mm / 1e3)),
         ]
     };
+
     let rows: Vec<Vec<String>> = facts.verdict.zones.iter().map(row).collect();
     let head = [
         page.zone,

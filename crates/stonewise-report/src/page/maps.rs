@@ -37,6 +37,7 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> St
         .flat_map(|c| c.values())
         .filter(|v| shared.exceeds(**v))
         .count();
+
     let component = |title: &str, note: &str, k: usize| {
         let value = move |s: &StoneRow| s.motion.as_ref().map(|m| m.face[k]);
         let picture = MapPicture {
@@ -50,6 +51,7 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> St
         };
         figure(title, &stone_map(&layout, &picture), note)
     };
+
     let mut grid = String::new();
     grid.push_str(&shape_map(&layout, facts));
     grid.push_str(&component(names.along, names.along_note, 0));
@@ -66,6 +68,7 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> St
     } else {
         String::new()
     };
+
     let body = format!(
         "<p>{}{note}</p>{PLACE}{}<div class=\"maps{wide}\">{grid}</div>",
         names.intro,
@@ -88,6 +91,7 @@ fn shape_map(layout: &MapLayout, facts: &Summary) -> String {
             .iter()
             .filter_map(|(_, m)| Some(m.deformation()?.norm()))
     };
+
     if lengths().next().is_none() {
         return String::new();
     }
@@ -106,6 +110,7 @@ fn shape_map(layout: &MapLayout, facts: &Summary) -> String {
     } else {
         ""
     };
+
     figure(
         names.shape,
         &stone_map(layout, &picture),
@@ -168,6 +173,7 @@ fn motion_map(results: &ResultSet, facts: &Summary) -> String {
         arrows: true,
         loose: false,
     };
+
     let class = if layout.is_wide() { "lead wide" } else { "lead" };
     let as_measured = match facts.verdict.has_datum() {
         true => "",
@@ -182,6 +188,7 @@ fn motion_map(results: &ResultSet, facts: &Summary) -> String {
         page.map_colours,
         &[("end", &*facts.texts().threshold(end_m * 1e3))],
     );
+
     let note = format!("{colours}{marks}{as_measured}");
     format!(
         "<div class=\"{class}\">{}</div>",
@@ -198,6 +205,7 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
     let limits = facts.limits.values().iter().copied();
     let turn = |s: &StoneRow| s.motion.as_ref().map(|m| m.rotation.norm());
     let turns = facts.measured.iter().map(|(_, m)| m.rotation.norm());
+
     let draw = |title: &str, note: &str, value: &dyn Fn(&StoneRow) -> Option<f64>, unit, limit, loose| {
         let picture = MapPicture {
             title,
@@ -210,6 +218,7 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
         };
         figure(title, &stone_map(layout, &picture), note)
     };
+
     let mut out = String::new();
     out.push_str(&draw(
         names.relative,
@@ -219,6 +228,7 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
         nice_scale_m(relatives),
         true,
     ));
+
     if facts.verdict.is_sound() {
         let median = texts.mm_or_dash(facts.limits.median());
         let note = fill(names.limit_note, &[("median", &*median)]);
@@ -231,6 +241,7 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
             false,
         ));
     }
+
     out.push_str(&draw(
         names.rotation,
         names.rotation_note,

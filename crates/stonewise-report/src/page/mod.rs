@@ -77,10 +77,12 @@ pub(super) fn page(results: &ResultSet) -> Result<String, Error> {
     } else {
         explorer::data(results, &facts, &compared, &joints)?
     };
+
     let body = format!(
         "<body>{PATTERNS}{}<nav>{links}</nav>\n<main>\n{content}</main>\n{data}",
         header(results, &facts)
     );
+
     // Of all that the page holds, so that no input can guess it.
     let nonce = &blake3::hash(body.as_bytes()).to_hex()[..32];
     let head = head(
@@ -89,6 +91,7 @@ pub(super) fn page(results: &ResultSet) -> Result<String, Error> {
         &format!("script-src 'nonce-{nonce}'; "),
         &format!("{}{}", footer(results, ""), explorer::STYLE),
     );
+
     Ok(format!(
         "{head}{body}<script nonce=\"{nonce}\">\n{}</script>\n</body></html>\n",
         explorer::SCRIPT
@@ -130,10 +133,12 @@ fn content(
     let mut body = String::new();
     body.push_str(&overview::summary(results, facts));
     body.push_str(&series::series(results, facts));
+
     if !results.stones.is_empty() {
         body.push_str(&maps::maps(results, facts, joints));
         body.push_str(&overview::tables(results, facts));
     }
+
     if !facts.measured.is_empty() {
         body.push_str(&distributions::distributions(
             results,
@@ -143,6 +148,7 @@ fn content(
         ));
         body.push_str(&distributions::datum(results, facts));
     }
+
     body.push_str(&instruments::instruments(results, facts.texts()));
     if let Some(evaluation) = &results.evaluation {
         body.push_str(&evaluation::evaluation(evaluation, facts.texts()));

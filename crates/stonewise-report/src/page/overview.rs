@@ -43,6 +43,7 @@ fn tiles(facts: &Summary) -> String {
         share(facts.measured.len()),
         &fill(page.tile_measured, &[("m", &count(facts.stones))]),
     );
+
     if !facts.verdict.is_sound() {
         let unknown = tile("\u{2013}".to_owned(), page.tile_cannot_tell);
         return format!(
@@ -50,6 +51,7 @@ fn tiles(facts: &Summary) -> String {
             page.as_computed
         );
     }
+
     let mm = |metres: Option<f64>| format!("{} <small>mm</small>", texts.mm(metres.unwrap_or(f64::NAN)));
     let largest = facts.verdict.wall.largest;
     let [what_moved, what_is_largest, what_limit] = match facts.verdict.has_datum() {
@@ -71,6 +73,7 @@ fn tiles(facts: &Summary) -> String {
             None => tile("\u{2013}".to_owned(), page.tile_no_motion),
         },
     ];
+
     format!("<div class=\"tiles\">{}</div>", tiles.concat())
 }
 
@@ -87,6 +90,7 @@ fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
             capital(texts.clauses.nothing_measured)
         )];
     }
+
     let mut out = vec![first_page::registration(results.datum(), facts)];
     if facts.verdict.is_sound() {
         out.push(chance(facts));
@@ -105,6 +109,7 @@ fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
         1 => texts.stones.one_loose.to_owned(),
         n => fill(texts.stones.some_loose, &[("n", &*count(n))]),
     });
+
     out
 }
 
@@ -167,20 +172,24 @@ pub(super) fn tables(results: &ResultSet, facts: &Summary) -> String {
             ]
         })
         .collect();
+
     out.push_str(&table(
         &[names.status, names.meaning, names.stones, names.share],
         &rows,
         2,
     ));
+
     // Which stones moved or are loose, a run in doubt cannot tell.
     if !facts.moved.is_empty() && facts.verdict.is_sound() {
         let _ = write!(out, "<h3>{}</h3>", names.largest);
         out.push_str(&stone_rows(results, facts, &facts.moved));
     }
+
     if !facts.loose.is_empty() && facts.verdict.is_sound() {
         let _ = write!(out, "<h3>{}</h3>", names.loose_stones);
         out.push_str(&stone_rows(results, facts, &facts.loose));
     }
+
     out.push_str(&stretches(results, facts));
     let lists: String = facts
         .by_status
@@ -210,6 +219,7 @@ fn stone_rows(results: &ResultSet, facts: &Summary, stones: &[(&StoneRow, &RowMo
         names.rotation,
         names.loose,
     ];
+
     let row = |(s, m): &(&StoneRow, &RowMotion)| {
         let place = results.facade.place(&s.centroid);
         vec![
@@ -226,12 +236,14 @@ fn stone_rows(results: &ResultSet, facts: &Summary, stones: &[(&StoneRow, &RowMo
             if m.loose { names.loose } else { "" }.into(),
         ]
     };
+
     let rows: Vec<Vec<String>> = stones.iter().take(MAX_ROWS).map(row).collect();
     let mut out = table(&head, &rows, 0);
     if stones.len() > MAX_ROWS {
         let values = [("shown", &*MAX_ROWS.to_string()), ("n", &*count(stones.len()))];
         let _ = write!(out, "<p class=\"note\">{}</p>", fill(names.rest, &values));
     }
+
     out
 }
 
@@ -251,6 +263,7 @@ fn stretches(results: &ResultSet, facts: &Summary) -> String {
         return String::new();
     }
     let texts = facts.texts();
+
     let edge = |i: usize| from + (to - from) * i as f64 / n as f64;
     let row = |i: usize| {
         let inside = |s: &StoneRow| {
@@ -277,6 +290,7 @@ fn stretches(results: &ResultSet, facts: &Summary) -> String {
         }
         row
     };
+
     let names = &texts.stones;
     let head = [
         names.stretch,
@@ -288,6 +302,7 @@ fn stretches(results: &ResultSet, facts: &Summary) -> String {
         names.above,
     ];
     let columns = if facts.verdict.is_sound() { 7 } else { 5 };
+
     format!(
         "<h3>{}</h3>{}",
         names.stretches,

@@ -95,6 +95,7 @@ pub(super) fn paths(results: &ResultSet, texts: &Texts) -> String {
         true => t.wall.length,
         false => t.deformation,
     });
+
     let one = |zone: &ZoneTrend| {
         let title = fill(
             names.path,
@@ -114,6 +115,7 @@ pub(super) fn paths(results: &ResultSet, texts: &Texts) -> String {
             &with_units(&escape(&path_in_words(zone, texts))),
         )
     };
+
     let pictures: String = trends.zones.iter().map(one).collect();
     match pictures.is_empty() {
         true => pictures,
@@ -137,6 +139,7 @@ fn path_in_words(zone: &ZoneTrend, texts: &Texts) -> String {
         let half = texts.mm(1.96 * largest * factor);
         say(&[("along", &along), ("up", &up), ("out", &out), ("half", &half)])
     };
+
     let velocity = EstimateRecord {
         value: zone.velocity,
         sd: zone.sd,
@@ -151,6 +154,7 @@ fn path_in_words(zone: &ZoneTrend, texts: &Texts) -> String {
     all.extend(temperature.map(|c| said(c, 10.0, &|v| fill(names.by_temperature, v))));
     let season = zone.season.iter().map(|s| &s.amplitude);
     all.extend(season.map(|c| said(c, 1.0, &|v| fill(names.by_season, v))));
+
     all.extend(
         zone.departure
             .iter()

@@ -26,6 +26,7 @@ pub(super) fn survey(results: &ResultSet, texts: &Texts) -> String {
         row
     };
     let dash = || "\u{2013}".to_owned();
+
     let rows = vec![
         row(names.date, &|e| e.date.as_deref().map_or_else(dash, escape)),
         row(names.conditions, &|e| conditions(e, texts).unwrap_or_else(dash)),
@@ -48,6 +49,7 @@ pub(super) fn survey(results: &ResultSet, texts: &Texts) -> String {
             motion.map_or(names.none.into(), |m| known_motion(m, texts))
         }),
     ];
+
     let mut head = vec![names.epoch];
     head.extend(chosen.iter().map(|e| e.name.as_str()));
     let columns = head.len();

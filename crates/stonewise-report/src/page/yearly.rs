@@ -38,6 +38,7 @@ pub(crate) fn yearly(newest: &ResultSet) -> Option<String> {
         conclusion(names),
         place_to_sign(texts),
     ];
+
     let body: String = { names.headings.iter().zip(&parts) }
         .map(|(heading, part)| format!("<section><h2>{heading}</h2>\n{part}</section>\n"))
         .collect();
@@ -131,6 +132,7 @@ fn epoch_row(epoch: &EpochVerdict, texts: &Texts) -> Vec<String> {
     let names = texts.yearly;
     let dash = || "\u{2013}".to_owned();
     let mm = |v: f64| texts.mm(v / 1e3);
+
     let interval = |value: f64, [low, high]: [f64; 2]| {
         let [value, low, high] = [value, low, high].map(mm);
         fill(
@@ -138,12 +140,14 @@ fn epoch_row(epoch: &EpochVerdict, texts: &Texts) -> Vec<String> {
             &[("value", &*value), ("low", &*low), ("high", &*high)],
         )
     };
+
     let wall = &epoch.wall;
     // Of results in doubt the numbers prove nothing.
     let sound = |text: String| if epoch.is_sound() { text } else { dash() };
     let measured = [("n", &*count(wall.measured)), ("m", &*count(wall.stones))];
     let deformed = epoch.deformation.as_ref().filter(|d| d.shown);
     let deformed = deformed.and_then(|d| Some(interval(d.largest_mm?, d.interval_mm?)));
+
     vec![
         escape(&epoch.epoch),
         texts.state(epoch.state).to_owned(),

@@ -19,16 +19,19 @@ pub(super) fn area(case: &Case, thresholds: &Thresholds, judged: &Judged, zone: 
         all.max_by(|a, b| a.length_mm.total_cmp(&b.length_mm))
     };
     let mut by_state = BTreeMap::new();
+
     for state in State::WORST_FIRST {
         let n = stones().filter(|s| s.verdict.state == state).count();
         by_state.insert(state.word().to_owned(), n);
     }
+
     let opened = judged.joints_in(zone).filter(|j| j.opened);
     let widest = opened.max_by(|a, b| a.verdict.opening_mm.total_cmp(&b.verdict.opening_mm));
     let limits = Sorted::new(stones().filter_map(|s| s.detection_limit_m));
     let limit = |share: f64| limits.quantile(share).map(millimetres);
     let q = stones().filter_map(|s| s.verdict.q);
     let reasons = reason_codes(case, thresholds, judged, zone);
+
     Area {
         state: reasons.first().map_or(State::CannotTell, |r| state_of(*r)),
         reasons,
@@ -119,6 +122,7 @@ fn reason_codes(
     let without = thresholds.is_empty();
     let measured = stones().filter(|s| s.verdict.length_mm.is_some()).count();
     let share = measured as f64 / stones().count().max(1) as f64;
+
     let length_matters = without
         || match zone {
             Some(_) => !thresholds.measures(zone).length.is_empty(),
@@ -146,11 +150,13 @@ fn reason_codes(
         (reaches, R::IntervalReachesThreshold),
         (deformation(Level::Reaches), R::DeformationReachesThreshold),
     ];
+
     let mut codes: Vec<R> = all
         .into_iter()
         .filter(|(holds, _)| *holds)
         .map(|(_, code)| code)
         .collect();
+
     if codes.is_empty() {
         codes.push(if without {
             R::NoMotionShown
@@ -158,5 +164,6 @@ fn reason_codes(
             R::BelowThresholds
         });
     }
+
     codes
 }

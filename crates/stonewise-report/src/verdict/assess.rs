@@ -68,6 +68,7 @@ fn judge(case: &Case, thresholds: &Thresholds) -> Judged {
         }
         found
     });
+
     Judged {
         stones,
         joints,
@@ -91,6 +92,7 @@ fn judge_stone(case: &Case, stone: &StoneCase, q: Option<f64>, thresholds: &Thre
         neighbours: Level::NotAsked,
         detection_limit_m: stone.measured.map(|m| m.detection_limit_m),
     };
+
     if let Some(measured) = &stone.measured {
         let moved = q.is_some_and(|q| q <= FALSE_DISCOVERY_RATE);
         let (length, neighbours) = (
@@ -110,6 +112,7 @@ fn judge_stone(case: &Case, stone: &StoneCase, q: Option<f64>, thresholds: &Thre
         verdict.neighbours_mm = Some(millimetres(measured.neighbours.vector.norm()));
         verdict.neighbours_interval_mm = finite(neighbours);
     }
+
     judged.verdict.state = stone_state(case, stone, &judged, thresholds.is_empty(), &measures);
     judged
 }

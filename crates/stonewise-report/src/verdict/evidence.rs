@@ -107,6 +107,7 @@ fn deformation(results: &ResultSet) -> Option<DeformationVerdict> {
             interval_mm: zone.interval_m.map(millimetres),
         })
     };
+
     let zones: Vec<DeformedZone> = record.zones.iter().filter_map(zone).collect();
     Some(DeformationVerdict {
         shown: !zones.is_empty(),

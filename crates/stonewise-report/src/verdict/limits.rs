@@ -59,6 +59,7 @@ pub(super) fn in_words(
     let differ = |a: &Limit, b: &Limit| a.micrometres != b.micrometres && a.quantity != b.quantity;
     let several = limits.iter().any(|a| limits.iter().any(|b| differ(a, b)));
     let mut words: Vec<String> = Vec::new();
+
     for limit in &limits {
         let names: Vec<String> = several
             .then(|| texts.clauses.quantities[limit.quantity as usize].to_owned())
@@ -74,6 +75,7 @@ pub(super) fn in_words(
             words.push(word);
         }
     }
+
     let last = words.pop().unwrap_or_default();
     match words.is_empty() {
         true => last,

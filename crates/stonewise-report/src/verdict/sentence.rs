@@ -116,6 +116,7 @@ impl Speaker<'_> {
         use ReasonCode as R;
         let c = &self.texts.clauses;
         let wall = self.wall;
+
         match reason {
             R::NotConverged => c.not_converged.to_owned(),
             R::InDoubt => c.in_doubt.to_owned(),
@@ -225,6 +226,7 @@ impl Speaker<'_> {
                 )
             }));
         };
+
         let [width, height] = zone
             .extent_m
             .map(|m| self.texts.threshold((10.0 * m).round() / 10.0));

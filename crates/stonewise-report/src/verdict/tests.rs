@@ -167,6 +167,7 @@ fn without_a_datum_nothing_is_fine_but_a_motion_against_the_rest_is_an_alarm() {
             verdict.sentence
         );
     }
+
     let mut moving = wall(1, 0.02, 6);
     moving.datum = Some(DatumState::Unknown);
     let sentence = judge(&moving, &Thresholds::default()).sentence;
@@ -176,12 +177,14 @@ fn without_a_datum_nothing_is_fine_but_a_motion_against_the_rest_is_an_alarm() {
         ),
         "{sentence}"
     );
+
     // Only motions against neighbours are asked for: a common motion does not matter.
     let neighbours = thresholds("neighbours = { attention_mm = 3.0, alarm_mm = 6.0 }");
     assert_eq!(judge(&case, &neighbours).state, State::Fine);
     let mut case = wall(1, 0.02, 6);
     case.datum = Some(DatumState::Unknown);
     case.stones[0].measured.as_mut().unwrap().loose = true;
+
     for thresholds in [usual(), neighbours] {
         let verdict = judge(&case, &thresholds);
         assert_eq!(verdict.state, State::Alarm, "{}", verdict.sentence);
@@ -262,11 +265,13 @@ fn zones_are_judged_by_their_own_thresholds() {
             .sentence
             .contains("2 stones moved beyond the alarm threshold of 4 mm (crest)")
     );
+
     assert_eq!(verdict.stones[0].zone.as_deref(), Some("crest"));
     assert_eq!(
         (verdict.stones[10].zone.clone(), verdict.stones[10].state),
         (None, State::Fine)
     );
+
     // The crest did not move, the rest did by less than its own threshold.
     let mut case = wall(0, 0.0, 9);
     case.stones[50] = stone(51, [0.0, 5.0], Vector3::x() * 0.006, &mut Normal::new(1));
@@ -443,6 +448,7 @@ fn deformations_have_thresholds_of_their_own_or_those_of_lengths() {
         );
         assert_eq!(verdict.deformation.unwrap().zones[0].state, state, "{text}");
     }
+
     let doubted = Case {
         in_doubt: true,
         ..bulged(true)

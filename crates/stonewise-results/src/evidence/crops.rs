@@ -82,6 +82,7 @@ pub fn write_crops(
         "half the edge of the crop on the plane of the stone's face",
         crops.iter().map(|c| c.half_m).collect::<Vec<f64>>(),
     )?;
+
     table.set_metadata(SIDE, side_px.to_string());
     table.set_metadata(PER_ROW, atlas.per_row.to_string());
     write_outlines(&path(dir, "crop_outlines", epoch, "parquet"), crops)?;
@@ -130,6 +131,7 @@ pub(super) fn read_crops(dir: &Path, epoch: usize) -> Result<Option<StoredCrops>
             rings: Vec::new(),
         })
         .collect();
+
     read_outlines(&path(dir, "crop_outlines", epoch, "parquet"), &mut crops)?;
     let atlas = Atlas {
         dir,
@@ -139,6 +141,7 @@ pub(super) fn read_crops(dir: &Path, epoch: usize) -> Result<Option<StoredCrops>
         per_row,
     };
     let pictures = atlas.read(crops.len())?;
+
     Ok(Some(StoredCrops {
         side_px,
         per_row,

@@ -102,11 +102,13 @@ fn stone_table(tracks: &Tracks) -> Result<Table, TableError> {
     let mut table = Table::new();
     let ids: Vec<u32> = stones.iter().map(|(id, _)| *id).collect();
     table.push("stone_id", "", "number of the stone", ids)?;
+
     for (axis, name) in ["along", "up"].into_iter().enumerate() {
         let place: Vec<f64> = stones.iter().map(|(_, s)| s.place[axis]).collect();
         let meaning = format!("place on the face whose displacement is given, {name}, from the centroid");
         table.push(&format!("place_{name}"), "m", &meaning, place)?;
     }
+
     let by: [(&str, &str, ShiftOf); 3] = [
         ("clouds", "the stone's own points alone", |s| s.clouds),
         (
@@ -120,16 +122,19 @@ fn stone_table(tracks: &Tracks) -> Result<Table, TableError> {
             |s| s.both,
         ),
     ];
+
     for (stem, whose, of) in by {
         let shifts: Vec<Option<FaceShift>> = stones.iter().map(|(_, s)| of(s)).collect();
         push_shift(&mut table, stem, whose, &shifts)?;
     }
+
     for epoch in [0, 1] {
         let name = |s: &StoneEvidence| tracks.photos.get(s.pictures.as_ref()?.photos[epoch]).cloned();
         let names: Vec<Option<String>> = stones.iter().map(|(_, s)| name(s)).collect();
         let meaning = "photo of the stone's picture; empty where there is none";
         table.push(&format!("photo_{}", epoch + 1), "", meaning, names)?;
     }
+
     let edges: Vec<Option<f64>> = stones
         .iter()
         .map(|(_, s)| s.pictures.as_ref().map(|p| p.edge_m))
@@ -153,6 +158,7 @@ fn push_shift(
     let column = |value: &dyn Fn(&FaceShift) -> f64| -> Vec<Option<f64>> {
         shifts.iter().map(|s| s.as_ref().map(value)).collect()
     };
+
     for (axis, name) in ["along", "up"].into_iter().enumerate() {
         let meaning = format!("displacement {name} by {whose}");
         table.push(
@@ -162,11 +168,13 @@ fn push_shift(
             column(&|s| s.shift_m[axis]),
         )?;
     }
+
     let terms = [
         ("along_along", "along"),
         ("along_up", "along and up"),
         ("up_up", "up"),
     ];
+
     for (k, (name, of)) in terms.into_iter().enumerate() {
         let meaning = format!("covariance of the displacement {of} by {whose}");
         table.push(
@@ -176,6 +184,7 @@ fn push_shift(
             column(&|s| s.covariance_m2[k]),
         )?;
     }
+
     Ok(())
 }
 
@@ -227,6 +236,7 @@ pub(super) fn read_tracks(dir: &Path, later: usize) -> Result<Option<StoredTrack
         table.required::<f64>("place_along")?,
         table.required::<f64>("place_up")?,
     ];
+
     let (clouds, photos) = (shift_columns(&table, "clouds")?, shift_columns(&table, "photos")?);
     let shown = [
         table.optional::<String>("photo_1")?,
@@ -234,6 +244,7 @@ pub(super) fn read_tracks(dir: &Path, later: usize) -> Result<Option<StoredTrack
     ];
     let both = shift_columns(&table, "both")?;
     let edges = table.optional::<f64>("edge_m")?;
+
     let mut pictures = |i: usize| -> Option<FacePictures> {
         Some(FacePictures {
             edge_m: edges[i]?,
@@ -246,6 +257,7 @@ pub(super) fn read_tracks(dir: &Path, later: usize) -> Result<Option<StoredTrack
             difference: Vec::new(),
         })
     };
+
     let stones: Vec<(u32, StoneEvidence)> = (0..table.rows())
         .map(|i| {
             let evidence = StoneEvidence {
@@ -266,6 +278,7 @@ pub(super) fn read_tracks(dir: &Path, later: usize) -> Result<Option<StoredTrack
         side_px,
         per_row,
     };
+
     let pictured = stones.iter().filter(|(_, s)| s.pictures.is_some()).count();
     Ok(Some(StoredTracks {
         tracks: Tracks {

@@ -18,6 +18,7 @@ pub(super) fn face_mesh(results: &ResultSet) -> ColouredMesh {
         scalars: columns.iter().map(|c| (c.name.to_owned(), Vec::new())).collect(),
         ..ColouredMesh::default()
     };
+
     for stone in &results.stones {
         let Some(outline) = results.outlines.get(&stone.stone_id) else {
             continue;
@@ -40,5 +41,6 @@ pub(super) fn face_mesh(results: &ResultSet) -> ColouredMesh {
             values.extend(outline.ring.iter().map(|_| value));
         }
     }
+
     mesh
 }

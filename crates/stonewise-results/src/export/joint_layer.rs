@@ -22,10 +22,12 @@ pub(super) fn joint_layer(
         ("stone_1", "number of one stone beside the joint"),
         ("stone_2", "number of the other stone"),
     ];
+
     for (k, (column, meaning)) in sides.into_iter().enumerate() {
         let id = |j: &Joint| results.stones[j.stones[k]].stone_id;
         table.push(column, "", meaning, joints.iter().map(id).collect::<Vec<u32>>())?;
     }
+
     let widths: Vec<f64> = joints.iter().map(|j| j.width_m).collect();
     table.push(
         "width",
@@ -42,6 +44,7 @@ pub(super) fn joint_layer(
         "motion of the stones apart, across the joint",
         of(|m| m.opening_m),
     )?;
+
     table.push(
         "sliding",
         "m",
@@ -60,6 +63,7 @@ pub(super) fn joint_layer(
         "standard deviation of the opening",
         of(|m| m.opening_sigma_m),
     )?;
+
     let significant = joints
         .iter()
         .map(|j| j.motion.as_ref().map(|m| u8::from(m.is_significant())));
@@ -70,6 +74,7 @@ pub(super) fn joint_layer(
         significant.collect::<Vec<Option<u8>>>(),
     )?;
     let openings = joints.iter().filter_map(|j| j.motion).map(|m| m.opening_m.abs());
+
     Ok(Layer {
         name: name.to_owned(),
         title: title.to_owned(),

@@ -20,15 +20,18 @@ pub(super) fn layers(results: &ResultSet) -> Result<Vec<Layer>, TableError> {
     let measured = results.measured();
     let styles = styles(&measured);
     let crs = crs(results);
+
     let world = |s: &StoneRow| {
         results
             .outlines
             .get(&s.stone_id)
             .map_or(Vec::new(), StoneOutline::seen_from_above)
     };
+
     let flat = |p: Point2<f64>| Point3::new(p.x, p.y, 0.0);
     let facade = |s: &StoneRow| results.unrolled(s).into_iter().map(flat).collect();
     let numbered = |name: &str| numbered(name, results.pair);
+
     let titled = |title: &str| {
         if results.pair == 1 {
             title.to_owned()
@@ -36,6 +39,7 @@ pub(super) fn layers(results: &ResultSet) -> Result<Vec<Layer>, TableError> {
             format!("{title}, epoch {}", results.pair + 1)
         }
     };
+
     let polygons = |name: &str, title: &str, geometry, crs, vertices| {
         Ok::<_, TableError>(Layer {
             name: numbered(name),
@@ -48,6 +52,7 @@ pub(super) fn layers(results: &ResultSet) -> Result<Vec<Layer>, TableError> {
             styles: styles.clone(),
         })
     };
+
     let factor = exaggeration(results, &measured);
     let all_joints = joints(results);
     let moved: Vec<(&StoneRow, &RowMotion)> = measured
@@ -64,6 +69,7 @@ pub(super) fn layers(results: &ResultSet) -> Result<Vec<Layer>, TableError> {
         let from = results.facade.place(&s.centroid);
         vec![flat(from), flat(from + m.face.xy() * factor)]
     };
+
     let lines = |name: &str, title: &str, geometry, crs, vertices| {
         Ok::<_, TableError>(Layer {
             name: numbered(name),
@@ -76,6 +82,7 @@ pub(super) fn layers(results: &ResultSet) -> Result<Vec<Layer>, TableError> {
             styles: vec![arrow_style()],
         })
     };
+
     let mut layers = vec![
         polygons(
             "stones",
@@ -122,6 +129,7 @@ pub(super) fn layers(results: &ResultSet) -> Result<Vec<Layer>, TableError> {
             |j| j.line.map(flat).to_vec(),
         )?,
     ];
+
     layers.extend(zone_layers(results, &numbered, &titled, crs)?);
     Ok(layers)
 }

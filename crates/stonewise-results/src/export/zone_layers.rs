@@ -37,6 +37,7 @@ pub(super) fn zone_layers(
         return Ok(Vec::new());
     }
     let flat = |zone: &Outlined| zone.facade.iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
+
     let layer = |name: &str, title: &str, geometry, crs, vertices| {
         Ok::<_, TableError>(Layer {
             name: numbered(name),
@@ -49,6 +50,7 @@ pub(super) fn zone_layers(
             styles: vec![zone_style()],
         })
     };
+
     Ok(vec![
         layer(
             "zones",
@@ -117,6 +119,7 @@ fn attributes(zones: &[Outlined]) -> Result<Table, TableError> {
         "area of the faces of its stones",
         reals(|z| z.place.area_m2),
     )?;
+
     table.push(
         "largest_m",
         "m",
@@ -135,6 +138,7 @@ fn attributes(zones: &[Outlined]) -> Result<Table, TableError> {
         "upper end of its 95 % interval",
         reals(|z| z.zone.interval_m[1]),
     )?;
+
     Ok(table)
 }
 

@@ -73,6 +73,7 @@ fn relief_is_mapped_like_the_image() {
     let view = CropView::random(&photo, [160.0, 120.0], 64, &params, &mut rng);
     let crop = view.cut(&photo);
     let relief = crop.relief().unwrap();
+
     assert_eq!((relief.width(), relief.height()), (64, 64));
     for (x, y) in (0..64).flat_map(|y| (0..64).map(move |x| (x, y))) {
         let at = view.to_photo([f64::from(x) + 0.5, f64::from(y) + 0.5]);
@@ -88,6 +89,7 @@ fn relief_is_mapped_like_the_image() {
         };
         assert_eq!(relief.get(x, y), Some(&expected));
     }
+
     assert!(view.cut(&plain).relief().is_none());
 }
 

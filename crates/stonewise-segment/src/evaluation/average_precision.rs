@@ -20,6 +20,7 @@ pub fn average_precision(photos: &[PhotoPairs], least_iou: f64) -> Option<f64> {
     ranked.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut curve: Vec<(usize, f64)> = Vec::new();
     let (mut right, mut wrong) = (0usize, 0usize);
+
     for stone in ranked {
         if stone.iou.is_some_and(|iou| iou >= least_iou) {
             right += 1;
@@ -30,11 +31,13 @@ pub fn average_precision(photos: &[PhotoPairs], least_iou: f64) -> Option<f64> {
         }
         curve.push((right, right as f64 / (right + wrong) as f64));
     }
+
     let mut best = 0.0f64;
     for point in curve.iter_mut().rev() {
         best = best.max(point.1);
         point.1 = best;
     }
+
     let at = |step: usize| {
         // Whole numbers keep recalls such as 0.29 from slipping by a rounding error.
         let needed = curve.partition_point(|(right, _)| right * RECALL_STEPS < step * references);

@@ -59,11 +59,13 @@ pub fn pair_masks(found: &Segmentation, reference: &LabelImage, ignore: &Raster<
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     let mut partner: BTreeMap<u32, (f64, u32)> = BTreeMap::new();
     let mut taken = BTreeSet::new();
+
     for (iou, f, r) in pairs {
         if !partner.contains_key(&f) && taken.insert(r) {
             partner.insert(f, (iou, r));
         }
     }
+
     let stone = |(label, extent): (&u32, &Extent)| {
         let partner = partner.get(label);
         let is_counted = |r: &u32| !counts.reference[r].is_mostly_ignored();
@@ -76,6 +78,7 @@ pub fn pair_masks(found: &Segmentation, reference: &LabelImage, ignore: &Raster<
             is_unknown: extent.is_mostly_ignored() || partner.is_some_and(|(_, r)| !is_counted(r)),
         }
     };
+
     PhotoPairs {
         references: counts
             .reference

@@ -270,6 +270,7 @@ impl MaskRcnnConfig {
         if self.roi.box_cells == 0 || self.roi.mask_cells == 0 || self.roi.samples == 0 {
             return fail("roi.box_cells, roi.mask_cells and roi.samples must be 1 or more");
         }
+
         if let Norm::Group { groups } = self.backbone.norm {
             let mut normalised = self.roi.mask_channels.clone();
             normalised.extend([self.backbone.width, self.fpn_channels]);
@@ -279,6 +280,7 @@ impl MaskRcnnConfig {
                 );
             }
         }
+
         let per_level = self.anchors.sizes[0].len();
         if per_level == 0 || self.anchors.sizes.iter().any(|sizes| sizes.len() != per_level) {
             return fail("anchors.sizes must hold equally many sizes, one or more, at every level");
@@ -290,17 +292,20 @@ impl MaskRcnnConfig {
             return fail("pixel_std must be finite and above 0");
         }
         let is_frozen = matches!(self.backbone.norm, Norm::FrozenBatch { .. });
+
         if self.relief_channels != 0 && (self.relief_channels != RELIEF_CHANNELS || is_frozen) {
             return Err(ConfigError(format!(
                 "relief_channels must be 0 or {RELIEF_CHANNELS}, the latter with group normalisation only"
             )));
         }
+
         if self
             .resize
             .is_some_and(|resize| resize.shorter == 0 || resize.longest == 0)
         {
             return fail("resize.shorter and resize.longest must be 1 or more");
         }
+
         Ok(())
     }
 

@@ -121,6 +121,7 @@ impl MaskRcnn {
                 is_stone.push(0.0);
             }
         }
+
         if drawn.is_empty() {
             return [nothing(), nothing()];
         }
@@ -147,6 +148,7 @@ impl MaskRcnn {
         let mask_cells = 2 * config.mask_cells;
         let (mut chosen, mut classes) = (vec![], vec![]);
         let (mut positive, mut offsets, mut masks) = (vec![], vec![], Vec::<f32>::new());
+
         for (image, (regions, targets)) in regions.iter().zip(targets).enumerate() {
             let sampling = &config.sampling;
             let matches = match_boxes(
@@ -169,6 +171,7 @@ impl MaskRcnn {
                 classes.push(0);
             }
         }
+
         if chosen.is_empty() {
             return [nothing(), nothing(), nothing()];
         }
@@ -183,6 +186,7 @@ impl MaskRcnn {
         let predicted = predicted.reshaped([chosen.len() * self.config.classes, 4]);
         let predicted = predicted.selected(of_stones.collect());
         let box_regression = smooth_l1(&predicted, &offsets, chosen.len());
+
         let stones: Vec<_> = positive.iter().map(|&place| chosen[place]).collect();
         let logits = self
             .roi_heads

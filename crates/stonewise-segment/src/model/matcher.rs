@@ -36,12 +36,14 @@ pub fn match_boxes(
             }
         }
     }
+
     let is_best = |candidate: &Bounds| {
         stones
             .iter()
             .zip(&best_of_stone)
             .any(|(stone, &most)| most > 0.0 && iou(*candidate, *stone) == most)
     };
+
     let decide = |(candidate, &(overlap, place)): (&Bounds, &(f32, usize))| {
         if overlap >= positive || (keep_best && overlap > 0.0 && is_best(candidate)) {
             Match::Stone(place)
@@ -51,6 +53,7 @@ pub fn match_boxes(
             Match::Between
         }
     };
+
     candidates.iter().zip(&best).map(decide).collect()
 }
 

@@ -111,6 +111,7 @@ fn fill(
         }
         return;
     }
+
     let xs = neighbours(columns, width);
     for (values, (top, bottom, down)) in values.chunks_mut(stride).zip(neighbours(rows, height)) {
         let row = |y: usize| &pixels[y * width..][..width];

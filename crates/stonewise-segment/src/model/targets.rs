@@ -28,6 +28,7 @@ impl<'a> Targets<'a> {
         let width = labels.width() as usize;
         // Pixels and bounds, of which right and bottom are the last inside.
         let mut stones: BTreeMap<u32, (usize, [usize; 4])> = BTreeMap::new();
+
         for (place, &label) in labels.data().iter().enumerate() {
             if label == 0 {
                 continue;
@@ -40,12 +41,14 @@ impl<'a> Targets<'a> {
             *right = x.max(*right);
             *bottom = y.max(*bottom);
         }
+
         stones.retain(|_, (pixels, _)| *pixels >= min_pixels);
         let [sx, sy] = seen.scale;
         let bounds = |(_, [left, top, right, bottom]): &(usize, [usize; 4])| {
             let [left, top, right, bottom] = [*left, *top, right + 1, bottom + 1].map(|side| side as f32);
             [left * sx, top * sy, right * sx, bottom * sy]
         };
+
         Self {
             sample,
             seen,

@@ -70,6 +70,7 @@ pub fn candidate(detection: &Detection, tile: &Rect, scaling: &Scaling) -> Optio
     let mut area = 0;
     let factor = |side: usize| f64::from(scaling.scaled[side]) / f64::from(scaling.photo[side]);
     let (fx, fy) = (factor(0), factor(1));
+
     for y in 0..target.height {
         let v = (f64::from(target.top + y) + 0.5) * fy - f64::from(inside.top);
         for x in 0..target.width {
@@ -82,6 +83,7 @@ pub fn candidate(detection: &Detection, tile: &Rect, scaling: &Scaling) -> Optio
             }
         }
     }
+
     (area > 0).then(|| Candidate {
         mask: Patch {
             left: target.left,

@@ -46,6 +46,7 @@ pub fn outline_boxes(
         by_scale.entry(scale_for(bounds, options)).or_default().push(i);
     }
     let mut found = Vec::new();
+
     for (scale, members) in by_scale {
         let size = Size::of(photo, &options.scales, scale);
         let mut by_tile: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
@@ -67,6 +68,7 @@ pub fn outline_boxes(
         };
         found.extend(stones.into_iter().flatten());
     }
+
     Ok(laid(found, photo))
 }
 

@@ -48,6 +48,7 @@ pub fn segment_photo<D: Detector>(
     let mut order: Vec<usize> = (0..scales.len()).collect();
     order.sort_by(|a, b| rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal));
     let mut candidates: Vec<Candidate> = Vec::new();
+
     for (place, &index) in order.iter().enumerate() {
         let size = Size::of(photo, &scales, index);
         let limit = options.stone_px / scales[index];
@@ -72,6 +73,7 @@ pub fn segment_photo<D: Detector>(
         let found = size.look(detector, relief, &needed, options, progress)?;
         candidates.extend(found.into_iter().filter(|c| longer_side(c) >= least));
     }
+
     Ok(merge(candidates, photo.width(), photo.height(), options))
 }
 

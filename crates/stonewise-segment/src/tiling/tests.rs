@@ -201,6 +201,7 @@ fn small_stones_are_found_enlarged_and_only_their_part_of_the_photo_is() {
             *labels.get_mut(x, y).unwrap() = *small.get(x, y).unwrap();
         }
     }
+
     let photo = coloured(&labels);
     let tiles = AtomicU32::new(0);
     let found = |scales: &[f64]| {
@@ -214,6 +215,7 @@ fn small_stones_are_found_enlarged_and_only_their_part_of_the_photo_is() {
             .scores
             .len()
     };
+
     let (as_it_is, at_one_size) = (found(&[1.0]), tiles.swap(0, Relaxed));
     let (closer, at_both) = (found(&[2.0, 1.0]), tiles.swap(0, Relaxed));
     let everywhere = (found(&[2.0]), tiles.swap(0, Relaxed));

@@ -65,6 +65,7 @@ impl<C: Serialize + for<'de> Deserialize<'de>> Checkpoint<C> {
         for (name, tensor) in &self.parameters {
             add(format!("{PARAMETER}{name}"), tensor.shape(), tensor.values());
         }
+
         for (name, moments) in &self.moments {
             add(format!("{MEAN}{name}"), &[moments.mean.len()], &moments.mean);
             add(
@@ -73,11 +74,13 @@ impl<C: Serialize + for<'de> Deserialize<'de>> Checkpoint<C> {
                 &moments.square,
             );
         }
+
         let mut views = Vec::new();
         for (name, shape, bytes) in &tensors {
             let view = TensorView::new(Dtype::F32, shape.clone(), bytes).map_err(|e| broken(path, e))?;
             views.push((name.as_str(), view));
         }
+
         let metadata = HashMap::from([(STATE.to_owned(), state)]);
         let write = |partial: &Path| {
             safetensors::serialize_to_file(views, Some(metadata), partial).map_err(std::io::Error::other)
@@ -96,10 +99,12 @@ impl<C: Serialize + for<'de> Deserialize<'de>> Checkpoint<C> {
         let state =
             state.ok_or_else(|| broken(path, "it holds weights only, not the state of a training"))?;
         let state: State<C> = serde_json::from_str(state).map_err(|e| broken(path, e))?;
+
         if state.format != FORMAT {
             let problem = format!("its format is {}, this program's is {FORMAT}", state.format);
             return Err(broken(path, problem));
         }
+
         let tensors = SafeTensors::deserialize(&bytes).map_err(|e| broken(path, e))?;
         let (mut parameters, mut means, mut squares) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
         for (name, view) in tensors.iter() {
@@ -118,12 +123,14 @@ impl<C: Serialize + for<'de> Deserialize<'de>> Checkpoint<C> {
                 squares.insert(name.to_owned(), values);
             }
         }
+
         let pairs = means.into_iter().map(|(name, mean)| {
             let square = squares.remove(&name);
             let square = square.ok_or_else(|| broken(path, format!("{SQUARE}{name} is missing")))?;
             Ok((name, Moments { mean, square }))
         });
         let moments = pairs.collect::<Result<_, TrainError>>()?;
+
         Ok(Self {
             elapsed: state.elapsed,
             config: state.config,

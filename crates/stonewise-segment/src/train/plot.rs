@@ -37,6 +37,7 @@ pub fn draw_curves(loss: &Path, validation: &Path, picture: &Path) -> Result<(),
         .into_iter()
         .map(|(name, points)| (name, smooth(&points)))
         .collect();
+
     let figures = columns(
         &read_curve(validation)?,
         &[
@@ -51,6 +52,7 @@ pub fn draw_curves(loss: &Path, validation: &Path, picture: &Path) -> Result<(),
     let steps = losses.iter().flat_map(|l| &l.1).map(|p| p[0]).fold(1.0, f64::max);
     let highest = losses.iter().flat_map(|l| &l.1).map(|p| p[1]).fold(0.1, f64::max);
     let (width, height) = (PANEL[0] + 2.0 * MARGIN + 60.0, 2.0 * (PANEL[1] + 2.0 * MARGIN));
+
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" \
          font-size=\"12\"><rect width=\"100%\" height=\"100%\" fill=\"white\"/>"
@@ -100,6 +102,7 @@ fn panel(svg: &mut String, top: f64, title: &str, lines: &[Line], high: [f64; 2]
          <rect x=\"{MARGIN}\" y=\"{top}\" width=\"{width}\" height=\"{height}\" fill=\"none\" stroke=\"#888\"/>",
         top - 8.0
     );
+
     for share in [0.25, 0.5, 0.75, 1.0] {
         let (step, value) = (share * high[0], share * high[1]);
         let _ = write!(
@@ -113,6 +116,7 @@ fn panel(svg: &mut String, top: f64, title: &str, lines: &[Line], high: [f64; 2]
             top + height + 16.0
         );
     }
+
     for (index, (name, points)) in lines.iter().enumerate() {
         let colour = COLOURS[index % COLOURS.len()];
         let path: Vec<String> = points

@@ -115,6 +115,7 @@ impl Run<'_> {
                 saved = Instant::now();
             }
         };
+
         self.save(trainer)?;
         Ok(stop)
     }

@@ -54,6 +54,7 @@ pub fn open_training(
         }
         return Ok(trainer);
     }
+
     let training = params.unwrap_or_else(|| match start {
         Start::Nothing(_) => TrainParams::default(),
         Start::Weights(_) => TrainParams::fine_tuning(),
@@ -71,6 +72,7 @@ pub fn open_training(
         }
         Start::Weights(weights) => open_model(weights, training.relief)?,
     };
+
     let config = TrainConfig {
         model: model.config().clone(),
         training,

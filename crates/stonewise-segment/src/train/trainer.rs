@@ -119,12 +119,14 @@ impl Trainer {
         let batches = self.batches(images);
         let count = batches.len() as f64;
         let mut sum = Gradients::default();
+
         for (losses, gradients) in batches {
             for (mean, loss) in figures.losses.iter_mut().zip(losses.parts()) {
                 *mean += f64::from(loss) / count;
             }
             sum.add(gradients);
         }
+
         if !figures.total().is_finite() {
             return Err(self.diverged("the loss", figures.total(), rate));
         }

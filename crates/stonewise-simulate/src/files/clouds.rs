@@ -60,6 +60,7 @@ impl Survey<'_> {
                 Ok(())
             })
         })?;
+
         found.sort_by_key(|t: &StoneTruth| t.id);
         let truths = truths.get_or_insert(found);
         Ok(SeenByScans {

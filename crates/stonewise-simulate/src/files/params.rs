@@ -82,6 +82,7 @@ impl SurveyParams {
                 rotation_rad: 0.02,
             },
         ];
+
         Self {
             name: "Demo wall".to_owned(),
             masks: MaskFiles::None,
@@ -145,6 +146,7 @@ impl SurveyParams {
                 rotation_rad: 0.03,
             },
         ];
+
         let scene = SceneParams {
             wall: WallParams {
                 width_m,
@@ -169,6 +171,7 @@ impl SurveyParams {
             }),
             ..SceneParams::default()
         };
+
         Self {
             name: format!("Simulated dam, {width_m} x {height_m} m"),
             masks: MaskFiles::Png,
@@ -225,6 +228,7 @@ impl SurveyParams {
             ("photos.focal_px", photos.focal_px),
             ("photos.distance_m", photos.distance_m),
         ];
+
         for (key, value) in positive {
             require(
                 value.is_finite() && value > 0.0,
@@ -233,6 +237,7 @@ impl SurveyParams {
                 "a positive number is needed",
             )?;
         }
+
         let shares = [
             ("scene.wall.tall_share", wall.tall_share),
             ("scene.wall.split_share", wall.split_share),
@@ -248,6 +253,7 @@ impl SurveyParams {
             format!("{widths:?}"),
             "smallest before largest, neither negative",
         )?;
+
         require(
             (1..=2).contains(&self.epochs),
             "epochs",
@@ -267,6 +273,7 @@ impl SurveyParams {
             photos.columns,
             "at least one photo is needed",
         )?;
+
         require(
             self.scene.tls.is_some() || self.scene.uav.is_some(),
             "scene.tls",

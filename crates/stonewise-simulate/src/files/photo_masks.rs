@@ -104,6 +104,7 @@ impl<'a> MaskWriter<'a> {
             let csv = truth.join(format!("epoch{number}_stones.csv"));
             return Ok(write_csv(&csv, &table, DESCRIPTION, None)?);
         }
+
         self.kept.sort_by(|a, b| a.0.cmp(&b.0));
         let (names, labels): (Vec<String>, Vec<LabelImage>) = self.kept.into_iter().unzip();
         let known: Vec<Vec<InstanceInfo>> = labels.iter().map(true_instances).collect();
@@ -118,6 +119,7 @@ impl<'a> MaskWriter<'a> {
             .collect();
         let masks = self.survey.folder.join("masks");
         create_folder(&masks)?;
+
         let unknown = vec![Vec::new(); shuffled.len()];
         write_coco(
             &masks.join(format!("epoch{number}.json")),

@@ -35,10 +35,12 @@ pub(super) fn write_photos(survey: &Survey) -> Result<Vec<u32>, SimulateError> {
         .begin(&format!("photos of epoch {number}"), exact.len() as u64);
     let is_small = (extent[1] - extent[0]) * (extent[3] - extent[2]) <= ONE_SURFACE_M2;
     let whole = is_small.then(|| survey.world.surface(extent));
+
     let scene = whole.as_ref().map(|s| survey.world.scene_of(s, survey.epoch));
     let day = day_of(params, survey.epoch);
     let darkroom = scene.as_ref().map(|s| Darkroom::new(s, params, &day));
     let mut sampled = SampledFaces::default();
+
     for (view, shown_part) in along_the_wall(wall, &exact) {
         survey.progress.check()?;
         let part = format!("{}.json", view.name);
@@ -67,6 +69,7 @@ pub(super) fn write_photos(survey: &Survey) -> Result<Vec<u32>, SimulateError> {
         masks.take_up(view, &finished, &mut shown);
         survey.progress.advance(1);
     }
+
     masks.finish()?;
     write_cameras(survey.folder, &exact, params, number, seed + 4)?;
     Ok(shown)

@@ -59,6 +59,7 @@ pub fn write_survey(
     let world = World::new(&params.scene);
     let mut truths = None;
     let (mut seen, mut points) = (Vec::new(), 0);
+
     for epoch in 0..params.epochs as usize {
         let survey = Survey {
             folder,
@@ -75,12 +76,14 @@ pub fn write_survey(
             photos: write_photos(&survey)?,
         });
     }
+
     let truths = truths.unwrap_or_default();
     let truth = folder.join("truth/stones.csv");
     write_stone_table(&truth, &truths, &seen)?;
     write_text(&folder.join("simulation.toml"), &toml::to_string(params)?)?;
     let (project, project_uav) = write_projects(folder, params)?;
     unfinished.remove()?;
+
     Ok(SurveySummary {
         project,
         project_uav,

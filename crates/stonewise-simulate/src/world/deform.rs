@@ -123,6 +123,7 @@ pub fn move_stones(wall: &Wall, motions: &[WallMotion], seed: u64) -> Vec<TrueMo
             _ => {}
         }
     }
+
     moved
 }
 

@@ -132,6 +132,7 @@ fn fill(
     let height = rise[1] - rise[0];
     let cuts = head_joints(stretch, height, params, rng);
     let mut left_slant = 0.0;
+
     for (k, pair) in cuts.windows(2).enumerate() {
         let (x0, x1) = (pair[0], pair[1]);
         let last = k + 2 == cuts.len();

@@ -70,6 +70,7 @@ pub(super) fn develop(
                 }
             }
         });
+
     picture
 }
 
@@ -95,6 +96,7 @@ fn blur(data: &[[f32; 3]], width: usize, height: usize, sigma: f64) -> Vec<[f32;
         .collect();
     let total: f64 = weights.iter().sum();
     let weights: Vec<f32> = weights.iter().map(|w| (w / total) as f32).collect();
+
     let pass = |input: &[[f32; 3]], dx: isize, dy: isize| -> Vec<[f32; 3]> {
         (0..height)
             .into_par_iter()
@@ -115,6 +117,7 @@ fn blur(data: &[[f32; 3]], width: usize, height: usize, sigma: f64) -> Vec<[f32;
             })
             .collect()
     };
+
     pass(&pass(data, 1, 0), 0, 1)
 }
 

@@ -82,6 +82,7 @@ impl Painter {
         let (px, py) = (x + shift, y - shift);
         let blotch = self.rock.octaves(px / 0.11, py / 0.09, 3, 0.6);
         let warm = self.rock.octaves(px / 0.17 + 40.0, py / 0.17, 2, 0.6);
+
         // Bedding: faint parallel bands at the stone's own angle.
         let angle = (draw(1) - 0.5) * 0.9;
         let bands = self
@@ -92,6 +93,7 @@ impl Painter {
         let grain = self.grain.octaves(px / 0.020, py / 0.017, 4, 0.85) * (0.14 + 0.22 * draw(3));
         let bright = (0.72 + 0.56 * draw(4)) * (1.0 + 0.42 * blotch + bands + grain).max(0.2);
         let hue = 0.10 * warm + 0.07 * (draw(5) - 0.5);
+
         [
             base[0] * bright * (1.0 + hue),
             base[1] * bright,
@@ -150,6 +152,7 @@ impl Painter {
         let brighten = |c: Rgb, by: f64| c.map(|v| (v * (1.0 + by)).max(0.004));
         // Detail that a pixel at this range cannot show would only flicker.
         let fine = (18.0 / range_m).clamp(0.3, 1.0);
+
         match material {
             Material::Ground => {
                 let blades = n(p.x / 0.03, p.y / 0.02, 3) * fine;

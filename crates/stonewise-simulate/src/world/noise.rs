@@ -88,6 +88,7 @@ impl Noise {
         let j = floor(row.y);
         let fy = row.y - j as f64;
         let (sy, scale) = (fade(fy), 1.3 * amplitude);
+
         // At a height in a cell, what its left or right side adds is linear in the distance along x: height
         // and slope.
         let side = |i: i64| {
@@ -97,9 +98,11 @@ impl Noise {
                 scale * lerp(gx0, gx1, sy),
             ]
         };
+
         let mut cell = floor(row.x);
         let mut left = side(cell);
         let mut first = 0;
+
         while first < out.len() {
             let right = side(cell + 1);
             let start = row.x - cell as f64;

@@ -94,10 +94,12 @@ pub fn plan_views(wall: &Wall, params: &PhotoParams, epoch: usize, seed: u64) ->
     let w = wall.extent();
     let face = &wall.face;
     let (wide, high, foot) = (w[1] - w[0], w[3] - w[2].max(0.0), w[2].max(0.0));
+
     // Half of the width of the wall that a photo shows.
     let seen = 0.5 * params.distance_m * f64::from(params.width) / params.focal_px;
     let aspect = f64::from(params.height) / f64::from(params.width);
     let mut views = Vec::new();
+
     for row in 0..params.rows {
         for column in 0..params.columns {
             let mut stray = || params.placement_m * rng.random_range(-1.0..=1.0);
@@ -132,6 +134,7 @@ pub fn plan_views(wall: &Wall, params: &PhotoParams, epoch: usize, seed: u64) ->
             });
         }
     }
+
     views
 }
 

@@ -215,6 +215,7 @@ pub fn surroundings(wall: &Wall, params: &SurroundingsParams) -> Vec<Prop> {
         wall,
         props: Vec::new(),
     };
+
     let far = 90.0 + width_m;
     site.block(Ground, 0.0, [-far, -far, -2.0], [far, far, 0.0]);
     let pieces = if wall.face.is_plane() {
@@ -223,6 +224,7 @@ pub fn surroundings(wall: &Wall, params: &SurroundingsParams) -> Vec<Prop> {
         (width_m / CROWN_PIECE_M).ceil()
     };
     let length = width_m / pieces;
+
     for k in 0..pieces as usize {
         let a = -half + (k as f64 + 0.5) * length;
         // Pieces of a curve meet behind the face with a gap or an overlap of a centimetre.
@@ -234,6 +236,7 @@ pub fn surroundings(wall: &Wall, params: &SurroundingsParams) -> Vec<Prop> {
             [back - 0.12, end, top - 0.03],
         );
     }
+
     site.block(Bank, half, [-40.0, 0.0, -0.5], [0.02, 60.0, top + 0.15]);
     site.block(Bank, -half, [-40.0, -60.0, -0.5], [0.02, 0.0, top + 0.05]);
     if params.annex {
@@ -243,12 +246,14 @@ pub fn surroundings(wall: &Wall, params: &SurroundingsParams) -> Vec<Prop> {
         railing(&mut site, half, height_m);
     }
     let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
+
     for k in 0..params.shrubs {
         let share = (f64::from(k) + rng.random_range(0.25..0.75)) / f64::from(params.shrubs);
         let foot = site.foot(-half + width_m * share) * Point3::new(0.3, 0.0, 0.0);
         let body = shrub([foot.x, foot.y], 0.09 * height_m.min(5.0), &mut rng);
         site.props.push(body);
     }
+
     site.props
 }
 

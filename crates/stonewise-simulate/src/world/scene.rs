@@ -97,12 +97,14 @@ impl<'a> Scene<'a> {
             .collect();
         let drift = DriftGrid::new(wall, surface.window, motions);
         let cells = CellLists::new(wall, surface.window, &stones);
+
         let reach = |get: fn(f64, f64) -> f64, start: f64| {
             stones
                 .iter()
                 .map(|s| face_n(wall, &s.world_from_stone))
                 .fold(start, get)
         };
+
         // A stone of half a metre that turns by 0.1 rad lifts a corner by 5 cm at most.
         let layer = [
             reach(f64::min, 0.0) - 0.25,
@@ -305,6 +307,7 @@ impl<'a> Scene<'a> {
         let mut t = face.come_down(from, along, self.layer[1])?.max(start_m);
         let mut above: Option<(f64, f64)> = None;
         let mut free_m = 0.0;
+
         for _ in 0..200 {
             if t > limit {
                 return None;
@@ -333,6 +336,7 @@ impl<'a> Scene<'a> {
             let sideways = (1.0 - descent * descent).max(0.0).sqrt();
             t += (gap / (descent.max(0.0) + SLOPE * sideways)).max(4e-4);
         }
+
         None
     }
 
@@ -367,6 +371,7 @@ impl<'a> Scene<'a> {
                 side = -1;
             }
         }
+
         0.5 * (t0 + t1)
     }
 
@@ -384,6 +389,7 @@ impl<'a> Scene<'a> {
             stone: None,
             at: [0.0; 2],
         };
+
         for &k in self.cells.at(f.a, f.u) {
             let stone = &self.stones[k as usize];
             let [x, y, z] = stone.local(p);
@@ -397,6 +403,7 @@ impl<'a> Scene<'a> {
                 };
             }
         }
+
         // Mortar is recessed: most of the time that says enough.
         if f.n - self.mortar_top < lowest.height_m {
             let drift = self.drift.at(f.a, f.u);
@@ -410,6 +417,7 @@ impl<'a> Scene<'a> {
                 };
             }
         }
+
         lowest
     }
 }
@@ -473,6 +481,7 @@ impl CellLists {
         let origin = [window[0], window[2]];
         let size = [0, 2].map(|i| ((window[i + 1] - window[i]) / CELL_M) as usize + 1);
         let mut lists: Vec<Vec<u32>> = vec![Vec::new(); size[0] * size[1]];
+
         for (k, placed) in stones.iter().enumerate() {
             let b = moved_bounds(wall, placed);
             let range = |axis: usize| {
@@ -493,12 +502,14 @@ impl CellLists {
                 }
             }
         }
+
         let mut starts = vec![0u32];
         let mut flat = Vec::new();
         for list in lists {
             flat.extend(list);
             starts.push(flat.len() as u32);
         }
+
         Self {
             origin,
             size,

@@ -122,6 +122,7 @@ impl StripError {
         // A stream that no strip's beams have.
         rng.set_stream(u64::MAX - u64::from(strip));
         let mut draw = |sd: f64| Vector3::from_fn(|_, _| sd * normal(&mut rng));
+
         match params.drift {
             StripDrift::Smooth => {
                 let purpose = 100 + 3 * u64::from(strip);

@@ -149,6 +149,7 @@ impl Sweep<'_> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(self.window.stream(u64::from(*number), (row + ROW_ZERO) as u64));
         let elevation = row as f64 * step_rad;
+
         // Columns closer together in azimuth away from the horizon, so that points keep their distance.
         let step = step_rad / elevation.cos();
         let [first, last] = self.azimuths.map(|azimuth| azimuth / step);
@@ -225,6 +226,7 @@ fn stations(scene: &Scene, params: &TlsParams, seed: u64) -> Vec<Station> {
     let face = &scene.wall().face;
     let datum = shared_error(params.datum_m, seed);
     let apart = (extent[1] - extent[0]) / f64::from(params.stations.max(1));
+
     // How many stations see a place.
     let cover = match params.reach_m {
         reach if reach > 0.0 => (2.0 * reach / apart).clamp(1.0, f64::from(params.stations)),

@@ -96,6 +96,7 @@ pub fn scan_airborne(scene: &Scene, window: &Window, params: &UavParams, seed: u
         step,
         seed,
     };
+
     for number in 0..params.strips {
         let strip = Strip::new(scene, params, number, seed);
         let measured: Vec<Vec<_>> = range(0)
@@ -110,6 +111,7 @@ pub fn scan_airborne(scene: &Scene, window: &Window, params: &UavParams, seed: u
             scan.push(points, number);
         }
     }
+
     scan
 }
 
@@ -179,6 +181,7 @@ impl Flight<'_> {
             n: params.distance_m,
         });
         let error: Vector3<f64> = self.errors.at(strip.number, a);
+
         rows.filter_map(|row| {
             let u = limits[2] + (row as f64 + strip.phase) * self.step;
             let along = (face.world_of(&FacePoint { a, u, n: 0.0 }) - sensor).normalize();

@@ -127,11 +127,13 @@ impl Wall {
         let stone = &self.stones[i];
         let shape = &stone.shape;
         let u = stone.middle[1] + row.y;
+
         // How far the edge has fallen; then, only where any of the stone is left, the rest of its shape.
         for (k, v) in out.iter_mut().enumerate() {
             let a = stone.middle[0] + row.at(k);
             *v = -shape.edge_drop(stone.outline.distance(a + waves[0][k], u + waves[1][k]));
         }
+
         let there = |v: &f64| *v >= -0.1;
         let Some(first) = out.iter().position(there) else {
             out.fill(HIDDEN_M);
@@ -147,6 +149,7 @@ impl Wall {
             },
             &mut out[first..end],
         );
+
         // A place of its own in the noise, so that relief does not go on from stone to stone.
         let place = f64::from(stone.id.0) * 13.7;
         self.relief.add_octaves(
@@ -154,6 +157,7 @@ impl Wall {
             octaves(6, shape.gain, shape.relief_m),
             out,
         );
+
         for (k, v) in out.iter_mut().enumerate() {
             *v = (*v + shape.plain_height(row.at(k), row.y)).max(HIDDEN_M);
         }
@@ -200,6 +204,7 @@ impl Wall {
         let (mut count, mut sum_a, mut sum_u, mut cut) = (0usize, 0.0, 0.0, false);
         let steps = |from: f64, to: f64| ((to - from + 2.0 * reach) / STEP) as usize;
         let mut waves = [0, 1].map(|_| vec![0.0; steps(x0, x1) + 1]);
+
         for j in 0..=steps(y0, y1) {
             let u = y0 - reach + j as f64 * STEP;
             let row = Row {
@@ -231,6 +236,7 @@ impl Wall {
                 ];
             }
         }
+
         if count < 12 {
             return None;
         }
@@ -242,6 +248,7 @@ impl Wall {
             y1 >= extent[3] - 1e-6,
         ];
         let middle = [sum_a / count as f64, sum_u / count as f64];
+
         Some(SimStone {
             id: StoneId(0),
             world_from_stone: self.face.world_from_patch(middle[0], middle[1]),

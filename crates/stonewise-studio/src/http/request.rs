@@ -185,6 +185,7 @@ fn parse(bytes: &[u8]) -> Result<Option<(Head, usize)>, NoRequest> {
         Some("DELETE") => Method::Delete,
         _ => return Err(refused(405, "no such method here")),
     };
+
     let (path, query) = parsed
         .path
         .unwrap_or("")
@@ -199,6 +200,7 @@ fn parse(bytes: &[u8]) -> Result<Option<(Head, usize)>, NoRequest> {
         .iter()
         .map(text)
         .collect::<Result<Vec<_>, NoRequest>>()?;
+
     let closes = headers
         .iter()
         .any(|(n, v)| n == "connection" && v.eq_ignore_ascii_case("close"));

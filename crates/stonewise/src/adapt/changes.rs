@@ -69,6 +69,7 @@ pub fn changes(
             });
         Ok(outlines.collect())
     });
+
     let [old, new] = rings;
     let (mut old, mut new) = (old?, new?);
     let change = |(fate, stone, stones): (Fate, u32, Vec<u32>)| {
@@ -79,6 +80,7 @@ pub fn changes(
             outline: rings.remove(&stone).unwrap_or_default(),
         }
     };
+
     Ok(fates(&shared).into_iter().map(change).collect())
 }
 

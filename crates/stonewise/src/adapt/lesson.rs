@@ -115,6 +115,7 @@ pub fn lesson(run: &Run) -> Result<Lesson> {
     let project = run.context.project;
     let (mut photos, mut confirmed, mut keys) = (Vec::new(), Vec::new(), Vec::new());
     let mut corrected: BTreeSet<u32> = BTreeSet::new();
+
     for epoch in project
         .epochs
         .ids()
@@ -156,12 +157,14 @@ pub fn lesson(run: &Run) -> Result<Lesson> {
         }
         keys.push(step.key().as_str().to_owned());
     }
+
     if keys.is_empty() {
         return Err(refused(
             project,
             "every epoch has `masks`: train a detector on them with `stonewise train`",
         ));
     }
+
     if confirmed.len() < LEAST_STONES {
         return Err(refused(
             project,
@@ -172,6 +175,7 @@ pub fn lesson(run: &Run) -> Result<Lesson> {
             ),
         ));
     }
+
     let blocks = blocks(&confirmed);
     let labels = (1..).zip(&blocks);
     // Corrections are few: most of them are to be learnt from.
@@ -184,6 +188,7 @@ pub fn lesson(run: &Run) -> Result<Lesson> {
         .filter(|(_, b)| kept_blocks.contains(*b))
         .map(|(label, _)| label);
     let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
+
     Ok(Lesson {
         kept: kept.collect(),
         key: Key::new(STEP, &(), &keys),
@@ -389,6 +394,7 @@ impl Shown<'_> {
         let (width, height) = (self.masks.width(), self.masks.height());
         let mut drawn = Raster::filled(width, height, OPEN);
         let mut is_stone = Raster::filled(width, height, false);
+
         for (index, value) in drawn.data_mut().iter_mut().enumerate() {
             let by_mask = self.mask(index).1.and_then(|stone| values.get(&stone));
             let by_cloud = self.stone(index).and_then(|stone| values.get(&stone));
@@ -400,9 +406,11 @@ impl Shown<'_> {
                 is_stone.data_mut()[index] = true;
             }
         }
+
         let pixels = is_stone.data().iter().filter(|s| **s).count();
         let typical = (pixels as f64 / chosen.len().max(1) as f64).sqrt();
         let near = grown(&is_stone, (RING * typical).ceil() as usize);
+
         for (index, value) in drawn.data_mut().iter_mut().enumerate() {
             let is_no_stone = self.cloud.known.data()[index] && self.stone(index).is_none();
             let mask = self.mask(index).0;
@@ -411,6 +419,7 @@ impl Shown<'_> {
                 *value = 0;
             }
         }
+
         drawn
     }
 

@@ -177,6 +177,7 @@ fn learn(run: &Run, minutes: f64, training: &Path, at: &dyn Fn(usize)) -> Result
         photos(lesson.to_learn_from()),
         photos((0..lesson.photos.len()).collect()),
     );
+
     let [crops, measured] = [&learnt, &all].map(|photos| {
         PhotoCrops::new(
             photos,
@@ -197,6 +198,7 @@ fn learn(run: &Run, minutes: f64, training: &Path, at: &dyn Fn(usize)) -> Result
         no_images,
         progress,
     )?;
+
     at(2);
     let kept = measured.validation()?;
     let model = model_path(&folder);
@@ -223,6 +225,7 @@ fn learn(run: &Run, minutes: f64, training: &Path, at: &dyn Fn(usize)) -> Result
         gain_interval: gain.interval,
         model: None,
     };
+
     Ok((adapted, model))
 }
 

@@ -89,11 +89,13 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
     progress.begin("the survey and its repetition", 3);
     let mut repeated = halves_of(project, project.epochs.reference(), seed, &store, &quiet)?;
     let later = EpochId::at(1);
+
     for epoch in repeated.epochs.iter_mut() {
         epoch.clouds.clone_from(&project.epochs.reference().clouds);
         // A repetition is registered anew.
         epoch.same_survey_as = None;
     }
+
     progress.advance(1);
     let folder = out.join("repetition");
     let components = {
@@ -102,10 +104,12 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
         registered.epoch_errors.as_ref().and_then(|e| e.components)
     };
     progress.advance(1);
+
     if let Some(components) = components {
         let sizes = [components.translation_m, components.rotation_m];
         repeated.epochs[later].clouds = moved_clouds(&repeated.epochs[later], sizes, seed, &store)?;
     }
+
     let context = Context::with_store(&repeated, &folder, store, &quiet)?;
     let run = Run::new(&context, Until::Registered);
     let (registered, measured) = (run.registered(later)?, run.measured(later)?);
@@ -118,6 +122,7 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
     });
     let shared_m = registered.epoch_errors.as_ref().map_or(0.0, |e| e.shared_error_m);
     let is_known = measured.datum.state != DatumState::Unknown;
+
     let expected = |row: &StoneRow, motion: &RowMotion| {
         let stone = StoneId(row.stone_id);
         let of_registration = match is_known {
@@ -132,23 +137,27 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
         let shared = if is_known { 2.0 * shared_m * shared_m } else { 0.0 };
         expect(all, registration, shared, sources, motion.deformation_sd)
     };
+
     let all: Vec<Option<Expected>> = measured
         .rows
         .iter()
         .map(|row| row.motion.as_ref().map(|motion| expected(row, motion)))
         .collect();
     let found: Vec<&Expected> = all.iter().flatten().collect();
+
     if found.is_empty() {
         return Err(Error::Survey(
             "no stone was measured: the survey shows no stone well enough".to_owned(),
         ));
     }
+
     let medians = |of: &dyn Fn(&Expected, usize) -> Option<f64>| {
         [0, 1, 2].map(|axis| {
             let mut values: Vec<f64> = found.iter().filter_map(|e| of(e, axis)).collect();
             median(&mut values).map(|sd| 1e3 * sd)
         })
     };
+
     let limits_mm = |of: &dyn Fn(&Deformation) -> [Option<f64>; 3]| {
         let limits_m = registered.deformation.as_ref().map_or([None; 3], of);
         limits_m.map(|limit| limit.map(|m| 1e3 * m))
@@ -173,6 +182,7 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
         sd_with_one_more_mm: medians(&|e, axis| Some(e.one_more[axis])),
         sd_without_registration_mm: medians(&|e, axis| Some(e.without_registration[axis])),
     };
+
     write_readable_json(&out.join("design.json"), &design)?;
     let table = stones(&measured.rows, &all)?;
     write_parquet(&out.join("design.parquet"), &table)?;
@@ -314,10 +324,12 @@ fn stones(rows: &[StoneRow], all: &[Option<Expected>]) -> Result<Table> {
     let mut table = Table::new();
     let ids: Vec<u32> = rows.iter().map(|r| r.stone_id).collect();
     table.push("stone_id", "", "stone of the first epoch", ids)?;
+
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
         let values: Vec<f64> = rows.iter().map(|r| r.centroid[axis]).collect();
         table.push(name, "m", &format!("centroid, world {name}"), values)?;
     }
+
     let areas: Vec<f64> = rows.iter().map(|r| r.area_m2).collect();
     table.push("area_m2", "m2", "area of the visible face", areas)?;
     let status: Vec<String> = rows.iter().map(|r| r.status.to_string()).collect();
@@ -338,6 +350,7 @@ fn stones(rows: &[StoneRow], all: &[Option<Expected>]) -> Result<Table> {
             |e, axis| Some(e.one_more[axis]),
         ),
     ];
+
     for (name, meaning, of) in columns {
         for (axis, word) in ["along", "up", "out"].into_iter().enumerate() {
             let cells: Vec<Option<f64>> = all.iter().map(|e| e.as_ref().and_then(|e| of(e, axis))).collect();
@@ -349,6 +362,7 @@ fn stones(rows: &[StoneRow], all: &[Option<Expected>]) -> Result<Table> {
             )?;
         }
     }
+
     Ok(table)
 }
 
@@ -382,6 +396,7 @@ fn page(design: &Design, places: &[[f64; 2]], all: &[Option<Expected>]) -> Strin
             design.sd_without_registration_mm,
         ),
     ];
+
     page.html(&table(
         &["standard deviation, mm", "along", "up", "out"],
         &rows,
@@ -397,6 +412,7 @@ fn page(design: &Design, places: &[[f64; 2]], all: &[Option<Expected>]) -> Strin
             &zones,
             None,
         ));
+
     let bounds = |axis: usize| {
         let values = places.iter().map(|p| p[axis]);
         values.fold([f64::MAX, f64::MIN], |[low, high], v| [low.min(v), high.max(v)])
@@ -419,6 +435,7 @@ fn page(design: &Design, places: &[[f64; 2]], all: &[Option<Expected>]) -> Strin
             e.is_some_and(|e| e.sd[2] > limit)
         }),
     ];
+
     for (name, colour, radius_px, is_of) in kinds {
         let points: Vec<[f64; 2]> = places
             .iter()
@@ -433,6 +450,7 @@ fn page(design: &Design, places: &[[f64; 2]], all: &[Option<Expected>]) -> Strin
             name: name.to_owned(),
         });
     }
+
     page.heading("Stones").html(&map.svg());
     page.finish()
 }

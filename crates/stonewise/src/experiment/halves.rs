@@ -25,6 +25,7 @@ pub(super) fn halves_of(
         digests.push(store.digest(&files.cameras)?);
         photos = find_photos(&files.images, &epoch.read_cameras()?)?.paths;
     }
+
     for cloud in &epoch.clouds {
         digests.push(store.digest(cloud)?);
     }
@@ -43,6 +44,7 @@ pub(super) fn halves_of(
         }
         Ok(())
     })?;
+
     let halves = Project::read(&dir.file("stonewise.toml"))?;
     Ok(Project {
         settings: project.settings.clone(),

@@ -45,6 +45,7 @@ pub(super) fn paper_motions(stones: &[Stone]) -> Result<[KnownMotion; 2]> {
         .iter()
         .min_by(|a, b| from_middle(a).total_cmp(&from_middle(b)))
         .ok_or_else(none)?;
+
     let smaller = (across[1] - across[0]).min(high[1] - high[0]);
     let diameter_m = if smaller < 2.0 * DIAMETER_M {
         (0.5 * smaller).max(0.2)
@@ -52,6 +53,7 @@ pub(super) fn paper_motions(stones: &[Stone]) -> Result<[KnownMotion; 2]> {
         DIAMETER_M
     };
     let depth_m = DEPTH_M * diameter_m / DIAMETER_M;
+
     // Stones around the middle give the normal there: a single one leans.
     let near: Vector3<f64> = stones
         .iter()
@@ -60,6 +62,7 @@ pub(super) fn paper_motions(stones: &[Stone]) -> Result<[KnownMotion; 2]> {
         .sum();
     let bad = |e: stonewise_core::evaluate::MotionFieldError| Error::Survey(e.to_string());
     let shift = frame.along * SHIFT_M[0] + frame.up * SHIFT_M[1];
+
     Ok([
         KnownMotion {
             name: "translation",

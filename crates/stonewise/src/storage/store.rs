@@ -180,6 +180,7 @@ impl StepStore {
         let _mine = turn.lock().unwrap_or_else(PoisonError::into_inner);
         let identity = (path.clone(), key.as_str().to_owned());
         let dir = StepDir::at(path, key);
+
         if self.sound().contains(&identity) && published.is_empty() {
             return Ok((dir, Origin::Found));
         }
@@ -192,6 +193,7 @@ impl StepStore {
             State::Unfinished => Origin::Made,
             State::Damaged(why) => Origin::MadeAgain(why),
         };
+
         if origin != Origin::Found {
             self.refuse_others_work(name)?;
             if self.keeps == Keeps::Newest && self.scope.is_none() && !is_part {
@@ -199,6 +201,7 @@ impl StepStore {
             }
             dir.replace(published, make)?;
         }
+
         self.sound().insert(identity);
         Ok((dir, origin))
     }

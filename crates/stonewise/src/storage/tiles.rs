@@ -184,6 +184,7 @@ impl TileSource for DiskTiles {
             table.required("y")?,
             table.required("z")?,
         );
+
         let offsets = x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z]).collect();
         let cloud = Cloud::new(entry.origin, offsets);
         let cloud = Arc::new(match &self.frame {
@@ -198,6 +199,7 @@ impl TileSource for DiskTiles {
         if queue.len() > CACHED_TILES {
             queue.pop_front();
         }
+
         Ok((*cloud).clone())
     }
 }
@@ -280,6 +282,7 @@ pub fn cut_into_tiles(
         .map(|c| most_records(c))
         .collect::<Result<Vec<u64>>>()?;
     let mut occupied = OccupiedTiles::new(records.iter().sum(), size_m);
+
     for (file, (path, &records)) in clouds.iter().zip(&records).enumerate() {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         progress.begin(&format!("ingest {name}"), records);
@@ -296,6 +299,7 @@ pub fn cut_into_tiles(
         })?;
         invalid += summary.skipped;
     }
+
     let bins = spill.finish()?;
     progress.begin("sort tiles", bins.keys().len() as u64);
     let entries = bins
@@ -312,6 +316,7 @@ pub fn cut_into_tiles(
             Ok(entry)
         })
         .collect::<Result<Vec<_>>>()?;
+
     write_json(&step.file(SOURCES), &sources.finish())?;
     write_index(step, &entries)?;
     Ok(invalid)
@@ -360,6 +365,7 @@ fn tile_runs(
         }
         runs
     };
+
     let parts = (0..chunk.len().div_ceil(PART)).into_par_iter();
     parts.flat_map_iter(of_part).collect()
 }
@@ -489,6 +495,7 @@ fn write_tile(
         let values: Vec<f32> = records.iter().map(|r| r.offset[axis]).collect();
         table.push(column, "m", "point, relative to the origin of its tile", values)?;
     }
+
     let files: Vec<u32> = records.iter().map(|r| r.file).collect();
     table.push("file", "", "number of the input file, from 0", files)?;
     let indices: Vec<u64> = records.iter().map(|r| r.index).collect();
@@ -497,6 +504,7 @@ fn write_tile(
     table.push("source", "", "index of the source in sources.json", sources)?;
     let times: Vec<f32> = records.iter().map(|r| r.source.1).collect();
     table.push("time", "s", "time since the first point of its source", times)?;
+
     if keeps == Keeps::Values {
         for (channel, column) in ["red", "green", "blue"].into_iter().enumerate() {
             let values: Vec<u16> = records.iter().map(|r| r.colour[channel]).collect();
@@ -505,12 +513,14 @@ fn write_tile(
         let intensities: Vec<f32> = records.iter().map(|r| r.intensity).collect();
         table.push("intensity", "", "intensity, as the cloud has it", intensities)?;
     }
+
     write_parquet(&step.file(format!("{name}.parquet")), &table)?;
     let points = (0..cloud.len()).map(|i| cloud.world(i));
     let bounds = Bounds::of(points).unwrap_or(Bounds {
         min: origin,
         max: origin,
     });
+
     Ok(TileEntry {
         name: name.to_owned(),
         origin,

@@ -111,6 +111,7 @@ fn different_at(
         "" => part.to_owned(),
         path => format!("{path}.{part}"),
     };
+
     match (a, b) {
         (Value::Object(a), Value::Object(b)) => {
             let names = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
@@ -211,6 +212,7 @@ pub(super) fn first_cell(a: &str, b: &str, tolerance: &dyn Fn(&str) -> Tolerance
         let product = |[a, b]: [String; 2]| Some((variance(a)? * variance(b)?).sqrt());
         all.filter_map(product).next().unwrap_or(0.0)
     };
+
     for (number, (x, y)) in a.lines().zip(b.lines()).enumerate() {
         if x == y {
             continue;
@@ -243,6 +245,7 @@ pub(super) fn first_cell(a: &str, b: &str, tolerance: &dyn Fn(&str) -> Tolerance
             }
         }
     }
+
     let rows = [a, b].map(|text| text.lines().count());
     (rows[0] != rows[1]).then(|| format!("{} and {} lines", rows[0], rows[1]))
 }

@@ -17,6 +17,7 @@ pub(super) fn files(results: &Path, progress: &dyn Progress) -> Result<Vec<Findi
         let message = "the last run here has not finished: run it again";
         findings.push(Finding::new(KIND, UNFINISHED_FILE, Answer::Fails, message));
     }
+
     let digests = match Digests::read(results) {
         Ok(Some(digests)) => digests,
         Ok(None) => {
@@ -31,6 +32,7 @@ pub(super) fn files(results: &Path, progress: &dyn Progress) -> Result<Vec<Findi
     };
     let mut agree = 0;
     progress.begin("digests", digests.iter().count() as u64);
+
     for (file, digest) in digests.iter() {
         progress.check()?;
         let path = results.join(file);
@@ -43,12 +45,14 @@ pub(super) fn files(results: &Path, progress: &dyn Progress) -> Result<Vec<Findi
         }
         progress.advance(1);
     }
+
     for file in named_results_in(results)? {
         if file != Path::new(DIGESTS) && !digests.holds(&file) {
             let message = "has the name of a result, but the run did not make it";
             findings.push(Finding::of(&file, KIND, Answer::Open, message));
         }
     }
+
     let message = format!("{agree} files are as the run left them");
     findings.push(Finding::new(KIND, DIGESTS, Answer::Holds, message));
     Ok(findings)

@@ -18,11 +18,13 @@ pub(super) fn inputs(run: &RunRecord, project: &Project) -> Result<Vec<Finding>>
     let names = |names: Vec<&str>| names.join(", ");
     let recorded = names(run.epochs.iter().map(|e| e.name.as_str()).collect());
     let present = names(project.epochs.iter().map(|e| e.name.as_str()).collect());
+
     if recorded != present {
         let message = format!("the run's epochs are {recorded}, the project's {present}");
         findings.push(fails("epochs", message));
         return Ok(findings);
     }
+
     let parameters = [&run.parameters, &project.settings].map(json);
     if let Some(difference) = first_difference(&parameters[0], &parameters[1], &|_| Tolerance::ROUNDING) {
         findings.push(fails(
@@ -30,6 +32,7 @@ pub(super) fn inputs(run: &RunRecord, project: &Project) -> Result<Vec<Finding>>
             format!("differ from those of the run: {difference}"),
         ));
     }
+
     let mut agree = 0;
     let mut compare = |subject: &str, record: Option<&InputRecord>, path: Option<&Path>| -> Result<()> {
         match (record, path) {
@@ -53,6 +56,7 @@ pub(super) fn inputs(run: &RunRecord, project: &Project) -> Result<Vec<Finding>>
         }
         Ok(())
     };
+
     for (record, epoch) in run.epochs.iter().zip(project.epochs.iter()) {
         let subject = |what: &str| format!("{what} of {}", epoch.name);
         for i in 0..record.clouds.len().max(epoch.clouds.len()) {
@@ -63,14 +67,17 @@ pub(super) fn inputs(run: &RunRecord, project: &Project) -> Result<Vec<Finding>>
         compare(&subject("cameras"), record.cameras.as_ref(), cameras)?;
         compare(&subject("masks"), record.masks.as_ref(), epoch.masks.as_deref())?;
     }
+
     let edits = project.edits.as_ref().map(|e| e.path.as_path());
     compare("edits", run.edits.as_ref(), edits)?;
     let conditions = project.conditions.as_ref().map(|c| c.path.as_path());
     compare("conditions", run.conditions.as_ref(), conditions)?;
+
     for i in 0..run.instruments.len().max(project.instruments.len()) {
         let path = project.instruments.get(i).map(|file| file.path.as_path());
         compare("instruments", run.instruments.get(i), path)?;
     }
+
     let message = format!("{agree} inputs are those of the run");
     findings.push(Finding::new(KIND, "digests", Answer::Holds, message));
     Ok(findings)

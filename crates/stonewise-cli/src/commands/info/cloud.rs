@@ -43,18 +43,21 @@ fn text(details: &CloudDetails) -> String {
     if let Some(bounds) = &details.bounds {
         line(extent(bounds));
     }
+
     if let Some(claimed) = wrong_box(details) {
         line(format!("its header is wrong: it says {}", extent(&claimed)));
     }
     if let Some(rounding) = rounding(&details.rounding) {
         line(rounding);
     }
+
     if let Some(spacing) = details.spacing_m {
         line(format!(
             "{:.1} mm to the nearest point, in the median",
             spacing * 1000.0
         ));
     }
+
     let fields = details.fields.iter().map(|field| match field.range {
         Some([low, high]) => format!("{} {} to {}", field.name, short(low), short(high)),
         None => field.name.clone(),
@@ -63,6 +66,7 @@ fn text(details: &CloudDetails) -> String {
     if !fields.is_empty() {
         line(format!("fields: {}", fields.join(", ")));
     }
+
     for scan in &details.scans {
         let place = scan.origin.map_or(String::new(), |p| {
             format!(", scanner at ({:.3}, {:.3}, {:.3})", p.x, p.y, p.z)
@@ -74,6 +78,7 @@ fn text(details: &CloudDetails) -> String {
         let name = scan.name.strip_prefix("scan ").unwrap_or(&scan.name);
         line(format!("scan {name}: {points}{place}{sensor}{begun}"));
     }
+
     if details.scans.is_empty() {
         for source in details.sources.iter().take(MOST_SOURCES) {
             let times = source.times.and_then(|t| period(details.clock, t));
@@ -91,12 +96,14 @@ fn text(details: &CloudDetails) -> String {
             ));
         }
     }
+
     match (written(details), &details.software) {
         (Some(date), Some(software)) => line(format!("written {date} by {software}")),
         (Some(date), None) => line(format!("written {date}")),
         (None, Some(software)) => line(format!("written by {software}")),
         (None, None) => {}
     }
+
     line(match &details.crs {
         Some(crs) => format!("CRS {}", system(crs)),
         None => "no CRS".to_owned(),
@@ -119,6 +126,7 @@ fn json(details: &CloudDetails) -> serde_json::Value {
         json["dates"] = json!(source.times.and_then(|t| dates(details.clock, t)));
         json
     });
+
     json!({
         "kind": "cloud",
         "format": details.format,

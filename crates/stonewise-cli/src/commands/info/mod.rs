@@ -109,6 +109,7 @@ fn cameras(path: &Path) -> Result<Described> {
     let file = read_cameras(path)?;
     let mut text = format!("  {}\n", counted(file.views.len(), "posed photo"));
     let mut photos = Vec::new();
+
     for view in &file.views {
         let (camera, c) = (&view.camera, view.centre());
         text += &format!(
@@ -120,6 +121,7 @@ fn cameras(path: &Path) -> Result<Described> {
             "principal_point_px": camera.center_px, "centre_m": [c.x, c.y, c.z],
         }));
     }
+
     for (name, reason) in &file.skipped {
         text += &format!("  {name}: not usable: {reason}\n");
     }
@@ -134,6 +136,7 @@ fn cameras(path: &Path) -> Result<Described> {
     }
     let skipped = file.skipped.iter();
     let skipped = skipped.map(|(name, reason)| json!({ "name": name, "reason": reason.to_string() }));
+
     let warnings: Vec<String> = file.warnings.iter().map(ToString::to_string).collect();
     Ok(Described {
         text,

@@ -64,11 +64,13 @@ pub(crate) fn refuse_unconfirmed(adjustment: &Adjustment, results: &mut [PairRes
             covariance: translation_covariance(motion),
         })
     };
+
     let Some(wall) = SmallMotion::fit(&results.iter().enumerate().filter_map(sample).collect::<Vec<_>>())
     else {
         return;
     };
     let most = results.iter().map(|r| r.body).max().unwrap_or(0);
+
     for number in 2..=most {
         let stones: Vec<usize> = (0..results.len())
             .filter(|&i| results[i].body == number)

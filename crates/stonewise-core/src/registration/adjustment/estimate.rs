@@ -58,6 +58,7 @@ impl Adjustment {
         let prediction = &solution.field.from_others[i];
         // What counts as an error might be a motion after all.
         let slide_m2 = self.undetected_slide_m(i).powi(2);
+
         let case_of = |probability: f64,
                        prediction: &Prediction,
                        equations: &NormalEquations,
@@ -78,10 +79,12 @@ impl Adjustment {
                 by_field: by_field(equations, own),
             }
         };
+
         let case = |probability: f64, equations: &NormalEquations, own: &[f64; 9], slide_m2: f64| {
             case_of(probability, prediction, equations, own, slide_m2)
         };
         let own = self.prior.own_variances();
+
         let tied = |probability: f64| {
             let equations = &equations.with_field;
             let Some(across_m) = across_m else {
@@ -96,6 +99,7 @@ impl Adjustment {
                 case_of(probability * p_across, &beyond, equations, &own, slide_m2),
             ]
         };
+
         let p_loose = self.p_loose(stone);
         let Some(at_own) = equations.on_own.as_ref().filter(|_| stone.on_own.is_some()) else {
             let tied = Estimate::of(&tied(1.0));
@@ -110,6 +114,7 @@ impl Adjustment {
         let p_wrong = stone.p_wrong();
         let p_tied = 1.0 - p_loose - p_wrong;
         let photos = self.observed_by_photos(i, Moving::WithField);
+
         let without_clouds = photos.unwrap_or_else(NormalEquations::nothing);
         let mut cases = tied(p_tied);
         cases.push(case(p_loose, at_own, &self.prior.loose_variances(), 0.0));

@@ -119,6 +119,7 @@ impl Adjustment {
             let window = candidate.surface.window(&candidate.motion);
             self.surface.equations(&local, &candidate.motion, &window)
         };
+
         let compare = |own: &CandidateMotion| {
             let test = LikelihoodRatioTest {
                 pair: &local,
@@ -129,6 +130,7 @@ impl Adjustment {
             };
             test.run(self.surface.inflation_of_all(stone.surface()))
         };
+
         let own = stone.on_own.as_ref();
         Some(Evaluation {
             with_field: Some(&stone.with_field)

@@ -70,10 +70,12 @@ pub(super) fn joint_motions(
             observed: (in_world(&observed.0), world * vector),
         })
     };
+
     let graph = &adjustment.prior.graph;
     let stones: Vec<Option<JointStone>> = (0..results.len()).into_par_iter().map(stone).collect();
     let equations = solution.equations.iter().map(|e| &e.with_field);
     let (information, of_stones) = information(&adjustment.problem(equations));
+
     let pull = |i: usize| {
         let frame = graph.nodes[i].face_from_world;
         let of_points = adjustment.photo_part(i).map_or_else(Matrix3::identity, |photos| {
@@ -88,6 +90,7 @@ pub(super) fn joint_motions(
             on_stone: followed * of_points,
         }
     };
+
     JointMotions {
         pulls: (0..results.len()).into_par_iter().map(pull).collect(),
         stones,

@@ -47,6 +47,7 @@ pub(crate) fn neighbour_covariances(
             Some(Measured::new(adjustment, i, estimate, &octave))
         })
         .collect();
+
     let of_edge = |(k, edge): (usize, &Edge)| {
         let [a, b] = [measured[edge.low].as_ref()?, measured[edge.high].as_ref()?];
         let between = between([a, b], &solution.field.inverse.edges[k].transpose());
@@ -64,6 +65,7 @@ pub(crate) fn neighbour_covariances(
                 + of_poses([a, b]),
         })
     };
+
     let edges = adjustment.prior.graph.edges.par_iter().enumerate();
     edges.filter_map(of_edge).collect()
 }

@@ -246,6 +246,7 @@ fn motion(
     let photos = adjustment.photo_part(i);
     let mut translation = local.fixed_view_mut::<3, 3>(0, 0);
     translation += octaves.over_all(photos.as_ref()) + octaves.of_stone();
+
     if let Some(photos) = photos {
         translation += photos.pose_covariance(&photos);
     }
@@ -254,6 +255,7 @@ fn motion(
     let common = adjustment.prior.common_in(i).translation();
     let expected = world * (prediction.mean.fixed_rows::<3>(0) + common);
     let equations = adjustment.stones[i].more_probable().surface.equations();
+
     StoneMotion {
         second_from_first: Rigid3::from_parts(Translation3::from(arm + displacement - turned * arm), turned),
         displacement,

@@ -77,6 +77,7 @@ pub(crate) fn survey<'a, S: PairSource>(
     let mut windows = Vec::new();
     let mut sample: Vec<(usize, PairPoints)> = Vec::new();
     let mut stride = 1;
+
     for batch in 0..source.batch_count() {
         progress.check()?;
         let pairs = source.load(batch).map_err(AdjustError::Source)?;
@@ -97,6 +98,7 @@ pub(crate) fn survey<'a, S: PairSource>(
             }
         }
     }
+
     set_noise_factors(&mut stones, &windows);
     let shared: Vec<f64> = windows
         .iter()
@@ -107,6 +109,7 @@ pub(crate) fn survey<'a, S: PairSource>(
     }
     sample.retain(|(i, _)| stones[*i].noise_factors == [1.0; 2]);
     let keep = sample.len().div_ceil(SAMPLE).max(1);
+
     Ok(Survey {
         stones,
         spacing_m: upper_median(&mut spacings).unwrap_or(USUAL_SPACING_M),

@@ -50,6 +50,7 @@ pub(super) fn wall_apart(
         };
         (0..POINTS).map(point).collect::<Vec<[f32; 3]>>()
     };
+
     let pair = |k: u32| {
         let (column, row) = (f64::from(k % COLUMNS), f64::from(k / COLUMNS));
         let centroid = Point3::new(0.0, 0.3 * column, 0.2 * row) + apart(k);
@@ -65,6 +66,7 @@ pub(super) fn wall_apart(
             window: None,
         }
     };
+
     (0..COLUMNS * rows).map(pair).collect()
 }
 

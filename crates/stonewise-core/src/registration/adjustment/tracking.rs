@@ -77,6 +77,7 @@ impl Adjustment {
         let surroundings = self.surroundings();
         let progress = points.progress;
         progress.begin("track stones in photos", self.stones.len() as u64);
+
         for (batch, range) in points.batches.iter().enumerate() {
             let pairs = points.load(batch)?;
             let chips = photos.load(batch).map_err(AdjustError::Source)?;
@@ -107,6 +108,7 @@ impl Adjustment {
             tracks.extend(found.into_iter().flatten());
             progress.advance(range.len() as u64);
         }
+
         for (i, track) in tracks.iter().enumerate() {
             let found = track.start.translation;
             let reach_m = self.search_m(i, photos).max(self.params.max_step_m);
@@ -115,6 +117,7 @@ impl Adjustment {
                 self.put(i, StoneVector::from_translation(found));
             }
         }
+
         let stones = self.stones_in_photos(|i| tracks[i].place);
         self.photos = Some(PhotoModel::new(
             photos.params().clone(),

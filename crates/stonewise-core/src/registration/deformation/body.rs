@@ -64,6 +64,7 @@ impl<'a> Body<'a> {
         let place = |part: u32| large.binary_search(&part).ok();
         let mut next = vec![Vec::new(); large.len()];
         let mut small: BTreeMap<u32, usize> = BTreeMap::new();
+
         for &(low, high) in &motions.edges {
             let (Some(low), Some(high)) = (part_of(low), part_of(high)) else {
                 continue;
@@ -82,6 +83,7 @@ impl<'a> Body<'a> {
                 (None, None) => {}
             }
         }
+
         let of_wall = |wall: &Vec<usize>| {
             let beside = small.iter().filter(|(_, neighbour)| wall.contains(neighbour));
             let parts: BTreeMap<u32, bool> = wall
@@ -91,6 +93,7 @@ impl<'a> Body<'a> {
                 .collect();
             Self::new(motions, errors, &parts)
         };
+
         components(&next).iter().map(of_wall).collect()
     }
 
@@ -116,6 +119,7 @@ impl<'a> Body<'a> {
             .iter()
             .flat_map(|(_, ids)| ids.iter().copied().zip(0..))
             .collect();
+
         let error_of = |id: StoneId| Some((errors?.0, *number.get(&id)?));
         let stone = |(node, joint): &(usize, &'a JointStone)| {
             let error = error_of(joint.id);
@@ -141,6 +145,7 @@ impl<'a> Body<'a> {
                 own: joint.own + of_sources,
             }
         };
+
         let stones: Vec<BodyStone> = members.iter().map(stone).collect();
         let at: BTreeMap<usize, usize> = members.iter().map(|m| m.0).zip(0..).collect();
         let pair = |(low, high): &(usize, usize)| Some([*at.get(low)?, *at.get(high)?]);
@@ -149,6 +154,7 @@ impl<'a> Body<'a> {
         if motions.poses.nrows() > 0 {
             shared.add_joint(&motions.poses, stones.iter().map(|s| s.joint.by_poses.clone()));
         }
+
         if let Some((errors, _)) = errors {
             let row = |stone: &BodyStone| {
                 let row = error_of(stone.id).map_or(&[][..], |(e, k)| &e.rows[k]);
@@ -160,6 +166,7 @@ impl<'a> Body<'a> {
             };
             shared.add_joint(&errors.covariance, stones.iter().map(row));
         }
+
         Self {
             motions,
             neighbours: motions.edges.iter().filter_map(pair).collect(),

@@ -129,6 +129,7 @@ impl Fit<'_> {
             .map(|(s, a)| a.transpose() * s.displacement)
             .sum();
         let crossed = covariance.times(&columns);
+
         let of_rigid: Matrix6<f64> = columns.iter().zip(&crossed).map(|(a, x)| a.transpose() * x).sum();
         let of_stone = |i: usize| {
             let lever = &stones[i].lever;
@@ -140,6 +141,7 @@ impl Fit<'_> {
                 0.5 * (whole + whole.transpose()),
             )
         };
+
         let deformations: Vec<_> = (0..stones.len()).into_par_iter().map(of_stone).collect();
         RigidPart {
             squares: deformations.iter().map(|(d, c)| chi_square(d, c)).collect(),
@@ -192,6 +194,7 @@ impl Fit<'_> {
         let scales = trials.iter().filter_map(|(_, squares)| self.scale(squares));
         let scale = scales.reduce(f64::min)?;
         let loss = |squares: &[f64]| -> f64 { firm.iter().map(|&i| biweight_loss(squares[i] / scale)).sum() };
+
         let mut starts: Vec<(f64, Vector6<f64>)> = trials
             .into_iter()
             .map(|(rigid, squares)| (loss(&squares), rigid))
@@ -201,6 +204,7 @@ impl Fit<'_> {
             let squares = self.squares(rigid, precisions);
             self.shares(|i| biweight(squares[i] / scale))
         };
+
         let follow = |(_, start): &(f64, Vector6<f64>)| {
             let mut rigid = *start;
             for _ in 0..ROUNDS {
@@ -208,6 +212,7 @@ impl Fit<'_> {
             }
             (loss(&self.squares(&rigid, precisions)), rigid)
         };
+
         let mut followed: Vec<_> = starts.par_iter().take(FOLLOWED).map(follow).collect();
         followed.sort_by(|a, b| a.0.total_cmp(&b.0));
         self.least_moved(&followed, shares)

@@ -117,6 +117,7 @@ pub(super) fn scan(body: &Body) -> Option<Scan> {
     let left_over = [observed, beyond].map(|vectors| model.left_over(&vectors));
     let most_likely = bulges[place].most_likely(&left_over)?;
     let roots: Vec<Matrix3<f64>> = body.stones.iter().map(|s| root(&s.information)).collect();
+
     let simulate = |k: usize| {
         let mut random = Random::new(k as u64 + 1);
         let u = body.shared.draw(&mut random);
@@ -127,10 +128,12 @@ pub(super) fn scan(body: &Body) -> Option<Scan> {
         let vectors: Vec<Vector3<f64>> = body.stones.iter().enumerate().map(of_stone).collect();
         model.largest(&bulges, &vectors).map_or(0.0, |(z, _)| z)
     };
+
     let mut still: Vec<f64> = (0..SIMULATIONS).into_par_iter().map(simulate).collect();
     still.sort_by(f64::total_cmp);
     let above = still.iter().filter(|z| **z >= largest).count();
     let simulated = (1 + above) as f64 / (SIMULATIONS + 1) as f64;
+
     // Beyond what simulations resolve: the sum of the probabilities of all bulges (Bonferroni).
     let tested: usize = bulges.iter().map(|b| b.directions.iter().flatten().count()).sum();
     let sum = 2.0 * tested as f64 * Normal::standard().sf(largest);
@@ -139,6 +142,7 @@ pub(super) fn scan(body: &Body) -> Option<Scan> {
     let limits_m = |directions: &[usize]| {
         ZONE_EXTENTS_M.map(|extent_m| detection_limit_m(&bulges, extent_m, directions, limit))
     };
+
     Some(Scan {
         p: simulated.min(sum),
         most_likely,

@@ -45,6 +45,7 @@ fn wall(moved: impl Fn(usize) -> Vector3<f64>, error: impl Fn(usize) -> Vector3<
         .iter_mut()
         .for_each(|d| *d = SMatrix::identity());
     let of_stone = Matrix3::identity() / (SD_M * SD_M);
+
     let stone = |k: usize| {
         let displacement = moved(k) + error(k);
         Some(JointStone {
@@ -61,6 +62,7 @@ fn wall(moved: impl Fn(usize) -> Vector3<f64>, error: impl Fn(usize) -> Vector3<
             observed: (of_stone, of_stone * displacement),
         })
     };
+
     let pull = |k: usize| Pull {
         stone: StoneId(k as u32 + 1),
         on_field: SMatrix::zeros(),
@@ -110,11 +112,13 @@ fn the_covariance_is_that_of_dense_algebra() {
     let count = COLUMNS * ROWS;
     let mut dense = DMatrix::<f64>::zeros(9 * count, 9 * count);
     let mut information: BlockMatrix<9> = BlockPattern::<9>::new(count, &wall.edges).unwrap().zeros();
+
     for (i, d) in information.diagonal.iter_mut().enumerate() {
         let m = SMatrix::<f64, 9, 9>::from_fn(|_, _| rng.random_range(-1.0..1.0));
         *d = (m * m.transpose() + SMatrix::identity() * 40.0) * 1e7;
         dense.view_mut((9 * i, 9 * i), (9, 9)).copy_from(d);
     }
+
     for (block, &(low, high)) in information.edges.iter_mut().zip(&wall.edges) {
         *block = SMatrix::from_fn(|_, _| 1e7 * rng.random_range(-1.0..1.0));
         dense.view_mut((9 * high, 9 * low), (9, 9)).copy_from(block);
@@ -122,10 +126,12 @@ fn the_covariance_is_that_of_dense_algebra() {
             .view_mut((9 * low, 9 * high), (9, 9))
             .copy_from(&block.transpose());
     }
+
     wall.information = information;
     wall.poses = DMatrix::from_fn(3, 3, |r, c| if r == c { 4e-8 } else { 1e-8 });
     let mut by_field = DMatrix::<f64>::zeros(3 * count, 9 * count);
     let mut by_poses = DMatrix::<f64>::zeros(3 * count, 3);
+
     for (i, stone) in wall.stones.iter_mut().flatten().enumerate() {
         stone.by_field = SMatrix::from_fn(|_, _| rng.random_range(-1.0..1.0));
         by_field
@@ -138,12 +144,14 @@ fn the_covariance_is_that_of_dense_algebra() {
             by_poses.view_mut((3 * i, *k), (3, 1)).copy_from(by);
         }
     }
+
     let covariance = &by_field * dense.try_inverse().unwrap() * by_field.transpose()
         + &by_poses * &wall.poses * by_poses.transpose()
         + DMatrix::identity(3 * count, 3 * count) * (SD_M * SD_M);
     // Nothing moved, so that all stones count fully: each with the inverse of its own covariance.
     let mut rigid = DMatrix::<f64>::zeros(3 * count, 6);
     let mut weights = DMatrix::<f64>::zeros(3 * count, 3 * count);
+
     for i in 0..count {
         rigid
             .view_mut((3 * i, 0), (3, 6))
@@ -151,9 +159,11 @@ fn the_covariance_is_that_of_dense_algebra() {
         let own = covariance.view((3 * i, 3 * i), (3, 3)).try_inverse().unwrap();
         weights.view_mut((3 * i, 3 * i), (3, 3)).copy_from(&own);
     }
+
     let fit = (rigid.transpose() * &weights * &rigid).try_inverse().unwrap() * rigid.transpose() * &weights;
     let rest = DMatrix::identity(3 * count, 3 * count) - &rigid * fit;
     let expected = &rest * &covariance * rest.transpose();
+
     for (i, stone) in found(&wall).stones.iter().enumerate() {
         let expected: Matrix3<f64> = expected.fixed_view::<3, 3>(3 * i, 3 * i).into_owned();
         assert!(

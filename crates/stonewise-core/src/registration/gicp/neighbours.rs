@@ -37,6 +37,7 @@ pub fn relate_to_neighbours(stones: &mut [(Point3<f64>, PairResult)], params: &G
             Some(relative(motion(m)?, &others))
         })
         .collect();
+
     let mut tests = vec![None; stones.len()];
     for (&i, found) in measured.iter().zip(relatives) {
         if let (Ok(motion), Some((difference, covariance))) = (&mut stones[i].1.motion, found) {
@@ -46,6 +47,7 @@ pub fn relate_to_neighbours(stones: &mut [(Point3<f64>, PairResult)], params: &G
             tests[i] = Some(motion.own_motion_p);
         }
     }
+
     for i in discoveries(&tests, params.false_discovery_rate) {
         if let Ok(motion) = &mut stones[i].1.motion {
             motion.loose = true;

@@ -64,6 +64,7 @@ impl Partner {
         }
         .min(farthest);
         self.asked_at = *at;
+
         loop {
             let (mut first, mut second) = ((f64::INFINITY, u32::MAX), radius * radius);
             block.index.within(at, radius, |i, d2| {

@@ -239,6 +239,7 @@ fn one_stone_among_still_ones_is_loose() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let sigma = 5e-4;
     let mut stones = Vec::new();
+
     for id in 0..100u32 {
         let centroid = Point3::new(f64::from(id % 10) * 0.3, f64::from(id / 10) * 0.2, 0.0);
         let error =
@@ -268,6 +269,7 @@ fn one_stone_among_still_ones_is_loose() {
         };
         stones.push((centroid, result));
     }
+
     relate_to_neighbours(&mut stones, &GicpParams::default());
     let loose: Vec<usize> = (0..100)
         .filter(|&i| stones[i].1.motion.as_ref().unwrap().loose)

@@ -150,6 +150,7 @@ pub(super) fn window_points(
     let own: Vec<Point3<f64>> = stone.iter().map(|&i| first.points[i as usize]).collect();
     let radius = own.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
     let shape = GridIndex::new(&own, 0.25 * buffer_m);
+
     // For most points one of a few points of the stone is near enough; only the others need a search.
     let few: Vec<Point3<f64>> = own
         .iter()
@@ -164,6 +165,7 @@ pub(super) fn window_points(
             inside.push(i);
         }
     });
+
     inside.sort_unstable();
     inside.into_iter().map(point).collect()
 }

@@ -33,12 +33,14 @@ impl Compared {
                 overlapping(&observations.iter().map(seen_with).collect::<Vec<_>>())
             })
             .collect();
+
         let kept: Vec<usize> = (0..sources.len()).filter(|&s| chosen.contains(&own(s))).collect();
         let place = |source: usize| kept.binary_search(&source).ok();
         let of_sight = |sight: &Sight| {
             let source = place(sight.source)?;
             Some(Sight { source, ..*sight })
         };
+
         let of_observation = |o: &&Observation| {
             let seen: Vec<usize> = (0..o.sights.len())
                 .filter(|&k| place(o.sights[k].source).is_some())
@@ -47,6 +49,7 @@ impl Compared {
             part.sights = part.sights.iter().filter_map(of_sight).collect();
             Some(part)
         };
+
         Self {
             sights: sights.iter().filter_map(of_sight).collect(),
             observations: observations.iter().filter_map(of_observation).collect(),

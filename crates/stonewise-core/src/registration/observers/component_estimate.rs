@@ -25,6 +25,7 @@ pub(super) fn estimate(
     };
     let mut log = clamp(ObserverComponents::expected(class).to_log());
     let mut width = 0.5;
+
     for _ in 0..12 {
         progress.check()?;
         let mut probes = vec![log];
@@ -59,5 +60,6 @@ pub(super) fn estimate(
         }
         width = (0.7 * width).max(0.1);
     }
+
     Ok(ObserverComponents::from_log(log))
 }

@@ -95,15 +95,18 @@ pub(super) fn contrasts(
         patch_cells: params.patch_cells,
         outlier_sigmas: params.outlier_sigmas,
     };
+
     let mut noise = SurfaceNoise {
         sigma_m: [0.003; 2],
         tau_m: 0.001,
     };
     let mut shifts: BTreeMap<(usize, usize), Vector3<f64>> = BTreeMap::new();
+
     for _ in 0..ALIGNMENTS {
         noise = common_noise(&seen, &shifts, &noise, &layout);
         shifts = common_shifts(&seen, &shifts, &noise, &layout);
     }
+
     seen.par_iter()
         .map(|comparison| comparison.observe(&shifts, &noise, &layout))
         .collect()
@@ -128,6 +131,7 @@ impl Comparison {
         seen.sort_by_key(|s| (std::cmp::Reverse(s.points.len()), s.source));
         let (reference, others) = seen.split_first().filter(|(_, others)| !others.is_empty())?;
         let frame = FaceFrame::from_normal(&stone.normal).face_from_world();
+
         let pair = |other: &&SourcePoints| {
             let pair = PairPoints {
                 first: StoneId(1),
@@ -142,6 +146,7 @@ impl Comparison {
             };
             LocalPair::new(&pair, &frame, NoiseFactors::USUAL)
         };
+
         let sight = |s: &&SourcePoints| {
             let sight = Sight {
                 source: s.source,
@@ -151,6 +156,7 @@ impl Comparison {
             };
             (sight, s.points.len().min(params.max_points) as u64)
         };
+
         Some(Self {
             pairs: others.iter().map(pair).collect(),
             spacing_m: face_spacing(&thinned(&reference.points, params.max_points), &stone.normal),
@@ -192,6 +198,7 @@ impl Comparison {
         let mut covariance = DMatrix::zeros(3 * count, 3 * count);
         let mut of_reference = Matrix3::zeros();
         let points = |k: usize| self.sights[k].1 as f64;
+
         for k in 0..count {
             let shift = self.shift(k, shifts);
             let (value, spread) = self.equations(k, &shift, noise, layout).solved();
@@ -202,12 +209,14 @@ impl Comparison {
             block += spread * share;
             of_reference += spread * ((1.0 - share) / count as f64);
         }
+
         for r in 0..count {
             for c in 0..count {
                 let mut block = covariance.fixed_view_mut::<3, 3>(3 * r, 3 * c);
                 block += of_reference;
             }
         }
+
         Observation {
             sights: self.sights.iter().map(|s| s.0).collect(),
             directions: vec![Vector3::x(), Vector3::y(), Vector3::z()],
@@ -264,6 +273,7 @@ fn common_shifts(
         })
         .collect();
     let mut sums: BTreeMap<(usize, usize), Translation> = BTreeMap::new();
+
     for (key, term) in found.into_iter().flatten() {
         // The same two sources the other way round say the same with the other sign.
         let (key, sign) = if key.0 < key.1 {
@@ -275,6 +285,7 @@ fn common_shifts(
         sum.information += term.information;
         sum.vector += term.vector * sign;
     }
+
     sums.into_iter()
         .flat_map(|((a, b), sum)| {
             let shift = sum.solved().0;

@@ -58,6 +58,7 @@ pub(super) fn cross_check(
     }
     let all: Vec<&Observation> = within.iter().flatten().chain(&kept).collect();
     let weighted = reweighted(&unknowns, &all, &judging);
+
     let (prior, components) = judging.opened();
     let problem = Problem::new(&unknowns, &weighted.iter().collect::<Vec<_>>());
     let solution = problem.solve(&prior, &components)?;
@@ -67,6 +68,7 @@ pub(super) fn cross_check(
     let difference = shift(&shown) - shift(found);
     let factor = Cholesky::new(of_shift(found) + of_shift(&shown))?;
     let chi_square = difference.dot(&factor.solve(&difference));
+
     Some(CrossCheck {
         cells: kept.len(),
         error: shift(&shown),

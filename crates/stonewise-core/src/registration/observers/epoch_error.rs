@@ -167,6 +167,7 @@ fn of_sources(
             counts(pair),
         ),
     };
+
     let model = Model {
         components: match is_significant {
             true => components,
@@ -181,6 +182,7 @@ fn of_sources(
     let all: Vec<&Observation> = within.iter().flatten().chain(&stable).collect();
     let judging = model.widened(&unknowns, &all);
     progress.check()?;
+
     let (mut stable, mut moved_areas) = standing(&unknowns, &within, stable, &judging);
     let observations = [within[0].len(), within[1].len(), stable.len()];
     let datum = if stable.len() >= params.stable.min_cells {
@@ -190,10 +192,12 @@ fn of_sources(
     } else {
         Datum::Unknown
     };
+
     if datum != Datum::Stable {
         stable.clear();
         moved_areas.clear();
     }
+
     let all: Vec<&Observation> = within.iter().flatten().chain(&stable).collect();
     let assumed = model;
     let model = match datum {
@@ -210,6 +214,7 @@ fn of_sources(
         Datum::Unknown => relative_errors(pair, &within, &components, class, params),
         Datum::Stable | Datum::Sources => None,
     };
+
     let merged_error_m = relative.as_ref().and_then(|r| r.merged_error_m);
     let mut at = found.at_stones(pair, &unknowns, model.components.nugget_m);
     let motions = means_of_motions(pair, &at, &rigid);
@@ -225,6 +230,7 @@ fn of_sources(
             (Vec::new(), found.between(pair, &unknowns), joint)
         }
     };
+
     let cross_check = match datum {
         Datum::Sources => cross_check(pair, &within, &rigid, &model, params),
         Datum::Stable | Datum::Unknown => None,
@@ -287,6 +293,7 @@ fn estimated(
         return Ok((expected, 0.0));
     }
     let mut components = expected;
+
     for round in 0..2 {
         let all: Vec<&Observation> = within.iter().flatten().collect();
         let compared = Compared::of(sources, sights, &all);
@@ -306,6 +313,7 @@ fn estimated(
                 .for_each(|(o, w)| o.weight = w);
         }
     }
+
     let all: Vec<&Observation> = within.iter().flatten().collect();
     let problem = Problem::new(unknowns, &all);
     let deviance = |c: &ObserverComponents| problem.deviance(&Prior::new(c, 0.0), c);

@@ -183,6 +183,7 @@ impl Unknowns {
         if self.epochs[sight.source] == 1 {
             row.push((self.whole, Matrix3::identity()));
         }
+
         // The middle of a whole epoch is no foot of a station.
         if let (Some((first, _)), Target::Stone { normal }) = (self.stretch, sight.target)
             && !block.is_alone
@@ -198,6 +199,7 @@ impl Unknowns {
             };
             row.push((first, Matrix3::from_columns(&[in_face, of_epoch(0), of_epoch(1)])));
         }
+
         let Some(plane) = sight.plane() else { return row };
         if let Some(first) = self.planes.get(&(plane, self.of_source[sight.source])) {
             row.push((*first, Matrix3::identity()));
@@ -250,10 +252,12 @@ impl Unknowns {
                 log_det -= 2.0 * sd.ln();
             }
         };
+
         for block in &self.blocks {
             diagonal(&mut matrix, block.first, [prior.translation_m; 3]);
             diagonal(&mut matrix, block.first + 3, [prior.rotation_m; 3]);
         }
+
         if let Some((first, sd)) = self.stretch {
             diagonal(&mut matrix, first, [sd.shared, sd.of_epoch, sd.of_epoch]);
         }
@@ -268,6 +272,7 @@ impl Unknowns {
                 * Matrix3::from_diagonal(&information)
                 * of_whole.eigenvectors.transpose()),
         );
+
         for block in &self.blocks {
             let (inverse, knots_log_det) = knot_information(&block.knots, prior.drift(block));
             log_det += 3.0 * knots_log_det;
@@ -281,6 +286,7 @@ impl Unknowns {
                 }
             }
         }
+
         (matrix, log_det)
     }
 }

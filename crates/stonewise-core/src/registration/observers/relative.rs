@@ -48,6 +48,7 @@ pub(super) fn relative_errors(
     let unknowns = Unknowns::new(&sources, &all_sights(pair, &[]), class);
     let merged = class.merged();
     let sd_m = params.merged_error_m.unwrap_or(merged.sd_m);
+
     let prior = Prior {
         merged: Some(MergedDrift { sd_m, ..merged }),
         ..Prior::new(components, 0.0)
@@ -63,6 +64,7 @@ pub(super) fn relative_errors(
         let difference = neighbour_row(pair, stones, &unknowns);
         rigid.relative(&difference, &(lever(second) - lever(first)), &solution)
     };
+
     let count = pair.stones.len();
     let joint = JointErrors::new(
         (0..count).map(row).collect(),
@@ -70,6 +72,7 @@ pub(super) fn relative_errors(
         vec![Matrix3::zeros(); count],
         false,
     );
+
     Some(RelativeErrors {
         joint,
         merged_error_m: (0..2).any(is_merged).then_some(sd_m),

@@ -34,6 +34,7 @@ impl Sharpest {
             same_as: source.same_as.and_then(|s| new[s]),
             ..source.clone()
         });
+
         let stone = |stone: &SeenStone| {
             let sights = stone.sights.iter().filter_map(|s| {
                 let source = new[s.source]?;
@@ -46,6 +47,7 @@ impl Sharpest {
                 ..stone.clone()
             }
         };
+
         let areas = |list: &[StablePoints]| {
             let own = list.iter().filter_map(|p| {
                 let source = new[p.source]?;
@@ -55,6 +57,7 @@ impl Sharpest {
             });
             own.collect()
         };
+
         Some(Self {
             sources: sources.collect(),
             stones: pair.stones.iter().map(stone).collect(),

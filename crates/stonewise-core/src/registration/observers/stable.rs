@@ -149,6 +149,7 @@ fn columns(list: &[StablePoints], cell_m: f64) -> Vec<(usize, Vec<CellPoint>)> {
                 });
         }
     }
+
     let mut columns: BTreeMap<(usize, usize, [i64; 2]), Vec<CellPoint>> = BTreeMap::new();
     for ((area, cube), points) in cubes {
         let Some((_, normal, _)) = plane_of(&points) else {
@@ -158,6 +159,7 @@ fn columns(list: &[StablePoints], cell_m: f64) -> Vec<(usize, Vec<CellPoint>)> {
         let along = [(across + 1) % 3, (across + 2) % 3].map(|a| cube[a]);
         columns.entry((area, across, along)).or_default().extend(points);
     }
+
     columns
         .into_iter()
         .flat_map(|((area, across, _), points)| {
@@ -222,6 +224,7 @@ impl CellPlane {
             }
             plane = plane_of(&kept)?;
         }
+
         let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
         for p in &kept {
             *counts.entry(p.source).or_default() += 1;
@@ -234,6 +237,7 @@ impl CellPlane {
             && spread[1].sqrt() >= LEAST_EXTENT * params.cell_m
             && spread[0] < 0.25 * spread[1];
         kept.sort_by_key(|p| p.source);
+
         (counts.len() >= 2 && is_plane).then_some(Self {
             centre,
             normal,
@@ -250,6 +254,7 @@ impl CellPlane {
         let unknowns = 2 + sources.len();
         let mut information = DMatrix::<f64>::zeros(unknowns, unknowns);
         let mut vector = DVector::<f64>::zeros(unknowns);
+
         let row = |p: &CellPoint| {
             let d = p.place - self.centre;
             let mut row = DVector::<f64>::zeros(unknowns);
@@ -263,11 +268,13 @@ impl CellPlane {
             }
             (row, d.dot(normal))
         };
+
         for p in &self.points {
             let (row, height) = row(p);
             information.syger(1.0, &row, &row, 1.0);
             vector.axpy(height, &row, 1.0);
         }
+
         information.fill_upper_triangle_with_lower_triangle();
         let factor = Cholesky::new(information)?;
         let solution = factor.solve(&vector);
@@ -282,6 +289,7 @@ impl CellPlane {
         let freedom = self.points.len().saturating_sub(unknowns).max(1) as f64;
         let others = sources.len() - 1;
         let noise = factor.inverse().view((3, 3), (others, others)) * (squares / freedom);
+
         // The first source's own error is in every difference.
         let systematic = DMatrix::from_fn(others, others, |r, c| {
             systematic_m * systematic_m * if r == c { 2.0 } else { 1.0 }

@@ -63,11 +63,13 @@ impl Surface {
             inside: Vec::with_capacity(columns * rows),
             middle: [0.0; 2],
         };
+
         for k in 0..columns * rows {
             let [u, v] = surface.place(k);
             surface.heights.push(shape.at(u, v));
             surface.inside.push(is_inside(&face, u, v, params.rim_m));
         }
+
         surface.centre()?;
         Some(surface)
     }
@@ -184,6 +186,7 @@ impl HeightMap {
         let (columns, rows) = (count(0), count(1));
         let (mut sums, mut weights) = (vec![0.0; columns * rows], vec![0.0; columns * rows]);
         let mut square = 0.0;
+
         for p in points {
             let column = ((p.x - low[0]) / HEIGHT_CELL_M).round() as usize;
             let row = ((p.y - low[1]) / HEIGHT_CELL_M).round() as usize;
@@ -192,6 +195,7 @@ impl HeightMap {
             weights[k] += 1.0;
             square += above(p).powi(2);
         }
+
         let noise_m = (square / points.len() as f64).sqrt();
         let occupied = weights.iter().filter(|w| **w > 0.0_f32).count() as f64;
         let spacing_m = HEIGHT_CELL_M * (occupied / points.len() as f64).sqrt();
@@ -204,6 +208,7 @@ impl HeightMap {
             .zip(smooth(&weights))
             .map(|(s, w)| if w > 1e-9 { s / w } else { 0.0 })
             .collect();
+
         Some(Self {
             plane,
             low,

@@ -166,6 +166,7 @@ impl Tracker<'_> {
         let second = self.followed(&face, &mean.template, &chips[1], &mut track.start)?;
         track.likeness =
             beyond_chance(&face, &mean.template, &second.matches).ok_or(PhotoStatus::NotFound)?;
+
         let others = [&first, &second.grey].map(|grey| self.normalised(grey, &face.surface, OTHER_WINDOW));
         let verification = Verification {
             face: &face,
@@ -177,6 +178,7 @@ impl Tracker<'_> {
             .verified([&others[0], &others[1]])
             .ok_or(PhotoStatus::Ambiguous)?;
         track.apart_m = (apart * face.surface.cell_m).into();
+
         for (epoch, matches) in [&mean.matches, &second.matches].into_iter().enumerate() {
             for (chip, found) in chips[epoch].iter().zip(matches) {
                 track.sights.extend(
@@ -186,14 +188,17 @@ impl Tracker<'_> {
                 );
             }
         }
+
         let best = [
             self.best(&chips[0], &first, &before, &mean.matches),
             self.best(&chips[1], &second.grey, &second.patches, &second.matches),
         ];
+
         if let [Some(first), Some(second)] = best {
             let rim_m = self.params.rim_m;
             track.pictures = pictures(&face.surface, [first, second], self.picture_px, rim_m);
         }
+
         Ok(())
     }
 
@@ -267,6 +272,7 @@ impl Tracker<'_> {
         let (mut grey, mut patches) = take(start);
         let own = self.agreeing(face.first_mean(&patches))?;
         let mut matches = self.found(face.matches_across(template, &patches, &own))?;
+
         for _ in 1..ROUNDS {
             let shifts = matches.iter().flatten().map(|m| m.warp.shift);
             let shift = median_shift(shifts).unwrap_or_else(Vector2::zeros);
@@ -280,6 +286,7 @@ impl Tracker<'_> {
             let starts: Vec<Warp> = matches.iter().map(|m| start_after(m, shift)).collect();
             matches = self.found(Some(face.matches_from(template, &patches, &starts)))?;
         }
+
         Ok(Second {
             grey,
             patches,
@@ -339,6 +346,7 @@ impl Tracker<'_> {
         let by_rows = self.photos[photo].by_rows(&at, self.face_from_world)?;
         let shift =
             found.warp.shift * cell + Vector2::new(moved.x, moved.y) + Vector2::from(parallax) * moved.z;
+
         Some(Sight {
             photo,
             shift,

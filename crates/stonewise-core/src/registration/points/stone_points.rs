@@ -47,6 +47,7 @@ pub fn stone_points(
         let own = near.iter().filter(|p| p.labelled);
         own.map(|p| p.source).collect()
     });
+
     match Window::new([&first, &second], normal, shift, border_noises, sources) {
         Some(window) => StonePoints {
             first: near[0]

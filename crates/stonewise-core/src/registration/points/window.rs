@@ -50,6 +50,7 @@ impl Window {
         let second = Face::new(labelled[1], &face_from_world, shift)?;
         let rings = [&first.rings, &second.rings].map(|rings| RingIndex::new(rings));
         let shared = first.share_in(&rings[1]).min(second.share_in(&rings[0]));
+
         Some(Self {
             face_from_world,
             border_m: border_noises * first.noise_m.max(second.noise_m),

@@ -165,9 +165,11 @@ pub fn carry_labels<T: TileSource, S: LabelStore>(
             }
         },
     )?;
+
     let mut claims: BTreeMap<usize, BTreeMap<u32, u32>> = BTreeMap::new();
     let mut next = first_new;
     let mut outcomes = Vec::new();
+
     for (stone, near) in stones.iter().zip(&mut near) {
         for n in near.iter_mut() {
             let (tile, index) = n.point;
@@ -188,6 +190,7 @@ pub fn carry_labels<T: TileSource, S: LabelStore>(
         }
         outcomes.push(outcome);
     }
+
     for (&tile, claimed) in &claims {
         let mut table = labels.read(tile).map_err(|e| TransferError::labels(tile, e))?;
         for (&i, &stone) in claimed {
@@ -198,6 +201,7 @@ pub fn carry_labels<T: TileSource, S: LabelStore>(
             .write(tile, &table)
             .map_err(|e| TransferError::labels(tile, e))?;
     }
+
     Ok(CarryReport {
         outcomes,
         tiles: claims.into_keys().collect(),
@@ -255,9 +259,11 @@ fn judge(
             needed: LEAST_CELLS,
         });
     }
+
     let tolerance_m = tolerance_m(shape, params);
     let mut cells: CellMap<Cell, CellContent> = CellMap::default();
     let mut points = 0;
+
     for n in near {
         let is_own = n.is_on_surface(tolerance_m);
         if n.is_free && !is_own && n.place.height_m > 0.0 {
@@ -273,6 +279,7 @@ fn judge(
             false => content.others += 1,
         }
     }
+
     let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
     let covered_share = share(cells.len(), shape.cell_count());
     if covered_share < params.min_covered_share {
@@ -283,12 +290,14 @@ fn judge(
     if same_share < params.min_same_share {
         return Err(NotCarried::Different { share: same_share });
     }
+
     if points < u64::from(min_points) {
         return Err(NotCarried::FewPoints {
             points,
             needed: min_points,
         });
     }
+
     Ok(CarriedStone {
         stone: number,
         points,

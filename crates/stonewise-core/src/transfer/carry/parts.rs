@@ -79,6 +79,7 @@ pub fn join_parts<T: TileSource, S: LabelStore>(
     let stones: BTreeMap<StoneId, &Stone> = stones.iter().map(|s| (s.id, s)).collect();
     let mut numbers: BTreeMap<u32, u32> = BTreeMap::new();
     let mut joined = Vec::new();
+
     for (whole, on_face) in wholes.iter().zip(&on_faces) {
         let parts = parts(whole, on_face, &stones, missed_weight);
         let is_taken = parts.iter().any(|p| numbers.contains_key(&p.0));
@@ -90,6 +91,7 @@ pub fn join_parts<T: TileSource, S: LabelStore>(
             });
         }
     }
+
     let mut changed = BTreeSet::new();
     for tile in 0..tiles.tile_count() {
         progress.check()?;
@@ -108,6 +110,7 @@ pub fn join_parts<T: TileSource, S: LabelStore>(
             changed.insert(tile);
         }
     }
+
     Ok(JoinReport {
         joined,
         tiles: changed,
@@ -158,6 +161,7 @@ fn stones_on_faces<T: TileSource, S: LabelStore>(
             }
         },
     )?;
+
     Ok(on_faces)
 }
 

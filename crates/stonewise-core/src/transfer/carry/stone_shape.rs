@@ -51,18 +51,22 @@ impl StoneShape {
             Point2::new(frame.along.dot(&d), frame.up.dot(&d))
         };
         let mut sums: CellMap<Cell, [f64; 3]> = CellMap::default();
+
         for p in points {
             let height = frame.out.dot(&(p - centre));
             let sum = sums.entry(cell_of(&flat(p))).or_default();
             *sum = [sum[0] + 1.0, sum[1] + height, sum[2] + height * height];
         }
+
         // Sorted, because sums of floating-point numbers depend on their order.
         let sorted: BTreeMap<Cell, [f64; 3]> = sums.into_iter().collect();
         let (mut squares, mut freedoms) = (0.0, 0.0);
+
         for [n, sum, square] in sorted.values() {
             squares += (square - sum * sum / n).max(0.0);
             freedoms += n - 1.0;
         }
+
         let bounds = Bounds::of(points.iter().chain(&outline).copied())?;
         Some(Self {
             ring: outline.iter().map(flat).collect(),

@@ -43,6 +43,7 @@ fn epoch(
             truth[tile].push(stone);
         }
     }
+
     let mut labels = MemoryLabels::default();
     for (tile, truth) in truth.iter().enumerate() {
         let stone: Vec<u32> = truth.iter().map(|&s| if known(s) { s } else { 0 }).collect();
@@ -53,6 +54,7 @@ fn epoch(
         };
         labels.write(tile, &table).unwrap();
     }
+
     let clouds = tiles
         .into_iter()
         .map(|points| Cloud::from_world(Point3::origin(), points));
@@ -229,6 +231,7 @@ fn joined(step: f64, parts: [u32; 2], [photos, missed]: [u32; 2]) -> (JoinReport
     {
         *stone = 2;
     }
+
     let wanted = BTreeMap::from([(StoneId(2), Vector3::x())]);
     let shapes = stone_shapes(&tiles, &one, &wanted, &Silent).unwrap();
     let shift = Vector3::new(0.0, 0.3, -0.1);
@@ -247,6 +250,7 @@ fn joined(step: f64, parts: [u32; 2], [photos, missed]: [u32; 2]) -> (JoinReport
         shown(2, count(2), parts[1]),
         shown(3, count(3), 9),
     ];
+
     let mut target = labels.clone();
     let wholes = [whole, whole];
     let report = join_parts(&tiles, &labels, &mut target, &wholes, &stones, 0.25, &Silent).unwrap();

@@ -101,6 +101,7 @@ fn split(
         points: 0,
     };
     let mut reason = NoEffect::NotCrossed;
+
     for (stone, points) in touched.by_stone() {
         if !line.crosses(points.iter().map(|&i| &touched.points[i].place)) {
             continue;
@@ -119,6 +120,7 @@ fn split(
             Err(why) => reason = why,
         }
     }
+
     effect.after.sort_unstable();
     match effect.before.is_empty() {
         true => Err(reason),
@@ -191,18 +193,21 @@ fn add(
     if let Some(face) = face_around(touched, outline, &free) {
         free.retain(|&i| distance_m(&face, &flat(touched, i)) <= FACE_DEPTH_M);
     }
+
     if free.len() < min_points as usize {
         return Err(NoEffect::FewPoints {
             points: free.len() as u64,
             needed: min_points,
         });
     }
+
     let new = *next;
     *next += 1;
     for &i in &free {
         touched.points[i].stone = new;
         touched.points[i].added = true;
     }
+
     Ok(EditEffect {
         before: Vec::new(),
         after: vec![new],

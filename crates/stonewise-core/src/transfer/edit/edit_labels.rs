@@ -50,6 +50,7 @@ pub fn edit_labels<T: TileSource, S: LabelStore>(
     let mut next = wall.first_new;
     let mut edited_by = BTreeMap::new();
     let mut effects = Vec::new();
+
     for (index, edit) in edits.iter().enumerate() {
         let effect = apply(&mut touched, edit, wall.min_points, &mut next);
         if let Ok(effect) = &effect {
@@ -57,6 +58,7 @@ pub fn edit_labels<T: TileSource, S: LabelStore>(
         }
         effects.push(effect);
     }
+
     let origins = touched.origins();
     let gone = touched.gone(&origins);
     edited_by.retain(|stone, _| origins.contains_key(stone));

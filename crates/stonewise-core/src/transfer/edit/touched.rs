@@ -68,6 +68,7 @@ impl Touched {
                 }
             },
         )?;
+
         let mut points = Vec::new();
         each_tile(
             tiles,
@@ -95,6 +96,7 @@ impl Touched {
                 }
             },
         )?;
+
         let mut cells: HashMap<[i64; 2], Vec<u32>> = HashMap::new();
         for (i, point) in (0..).zip(&points) {
             cells
@@ -102,6 +104,7 @@ impl Touched {
                 .or_default()
                 .push(i);
         }
+
         Ok(Self { points, cells })
     }
 

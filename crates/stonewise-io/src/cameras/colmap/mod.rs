@@ -56,6 +56,7 @@ fn read_pair(cameras: &Path, images: &Path) -> Result<CameraFile, CameraError> {
     };
     let mut converted: BTreeMap<u32, Camera> = BTreeMap::new();
     let mut file = CameraFile::default();
+
     for raw in raw_images {
         let bad = |problem: String| super::malformed(images, raw.place.clone(), problem);
         let camera = match converted.entry(raw.camera_id) {
@@ -89,5 +90,6 @@ fn read_pair(cameras: &Path, images: &Path) -> Result<CameraFile, CameraError> {
             name: raw.name,
         });
     }
+
     Ok(file)
 }

@@ -30,6 +30,7 @@ pub fn camera(raw: &RawCamera, photo: &str, path: &Path) -> Result<Camera, Camer
     {
         return bad(format!("{name} has {count} parameters, found {}", p.len()));
     }
+
     let brown = |radial, rational, tangential| Distortion::brown(radial, rational, tangential);
     let fisheye = |radial| Distortion::fisheye(radial, [0.0; 2]);
     let (focal, center, distortion) = match (raw.model.as_str(), p) {
@@ -60,6 +61,7 @@ pub fn camera(raw: &RawCamera, photo: &str, path: &Path) -> Result<Camera, Camer
             });
         }
     };
+
     let side = |value: u64| u32::try_from(value).ok().filter(|&v| v > 0);
     let (Some(width), Some(height)) = (side(raw.width), side(raw.height)) else {
         return bad(format!("impossible image size {}x{}", raw.width, raw.height));
@@ -67,6 +69,7 @@ pub fn camera(raw: &RawCamera, photo: &str, path: &Path) -> Result<Camera, Camer
     if !p.iter().all(|v| v.is_finite()) || focal.iter().any(|&f| f <= 0.0) {
         return bad("parameters must be finite and focal lengths positive".to_owned());
     }
+
     Ok(Camera {
         width,
         height,

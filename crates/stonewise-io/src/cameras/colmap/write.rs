@@ -18,6 +18,7 @@ pub fn write_colmap(folder: &Path, views: &[View]) -> Result<(), CameraError> {
     let mut camera_lines = String::from("# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n");
     let mut image_lines =
         String::from("# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then POINTS2D[] as (X Y POINT3D_ID)\n");
+
     for (index, view) in views.iter().enumerate() {
         let known = cameras.iter().position(|&c| *c == view.camera);
         let camera = match known {
@@ -50,6 +51,7 @@ pub fn write_colmap(folder: &Path, views: &[View]) -> Result<(), CameraError> {
             view.name
         );
     }
+
     let write = |name: &str, text: &str| {
         let path = folder.join(name);
         write_atomically(&path, |partial| std::fs::write(partial, text))
@@ -90,6 +92,7 @@ fn camera_line(camera: &Camera) -> Result<String, &'static str> {
         }
         Distortion::Fisheye(brown) => ("OPENCV_FISHEYE", brown.radial().to_vec()),
     };
+
     let mut line = format!("{model} {} {}", camera.width, camera.height);
     for value in camera.focal_px.into_iter().chain(camera.center_px).chain(terms) {
         let _ = write!(line, " {value}");

@@ -28,6 +28,7 @@ impl Similarity {
         if element.children.is_empty() && element.text.trim().is_empty() {
             return Ok(None);
         }
+
         if element.children.is_empty() {
             let m = parse_numbers::<16>(&element.text, element, path)?;
             let linear = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
@@ -39,20 +40,24 @@ impl Similarity {
                 scale,
             }));
         }
+
         let mut similarity = Self::identity();
         if let Some(rotation) = element.child("rotation") {
             let m = parse_numbers::<9>(&rotation.text, rotation, path)?;
             similarity.rotation = checked_rotation(&Matrix3::from_row_slice(&m), rotation, path)?;
         }
+
         if let Some(translation) = element.child("translation") {
             similarity.translation = parse_numbers::<3>(&translation.text, translation, path)?.into();
         }
+
         if let Some(scale) = element.child("scale") {
             [similarity.scale] = parse_numbers::<1>(&scale.text, scale, path)?;
             if similarity.scale <= 0.0 {
                 return Err(malformed(path, scale.place(), "scale must be positive"));
             }
         }
+
         Ok(Some(similarity))
     }
 

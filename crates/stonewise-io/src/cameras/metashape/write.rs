@@ -35,6 +35,7 @@ pub fn write_metashape(path: &Path, views: &[View], crs: Option<&str>) -> Result
             numbers.join(" "),
         );
     }
+
     let mut text = String::from(concat!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<document version=\"2.0.0\">\n",
         "  <chunk label=\"Chunk 1\" enabled=\"true\">\n",
@@ -50,6 +51,7 @@ pub fn write_metashape(path: &Path, views: &[View], crs: Option<&str>) -> Result
         "          <translation locked=\"false\">0 0 0</translation>\n",
         "          <scale locked=\"false\">1</scale>\n        </transform>\n      </component>\n    </components>\n",
     ));
+
     let _ = writeln!(
         text,
         "    <cameras next_id=\"{}\" next_group_id=\"0\">",
@@ -61,6 +63,7 @@ pub fn write_metashape(path: &Path, views: &[View], crs: Option<&str>) -> Result
         text,
         "    </cameras>\n    <reference>{crs}</reference>\n  </chunk>\n</document>"
     );
+
     write_atomically(path, |partial| std::fs::write(partial, text)).map_err(|source| CameraError::Write {
         path: path.to_owned(),
         source,
@@ -84,6 +87,7 @@ fn sensor(id: usize, camera: &Camera, path: &Path) -> Result<String, CameraError
     };
     let [fx, fy] = camera.focal_px;
     let size = [f64::from(camera.width), f64::from(camera.height)];
+
     let values = [
         ("f", fy),
         ("cx", camera.center_px[0] - size[0] / 2.0),
@@ -101,15 +105,18 @@ fn sensor(id: usize, camera: &Camera, path: &Path) -> Result<String, CameraError
         "<resolution width=\"{}\" height=\"{}\"/>",
         camera.width, camera.height
     );
+
     let mut text = format!(
         "      <sensor id=\"{id}\" label=\"sensor {id}\" type=\"{kind}\">\n        {resolution}\n        \
          <calibration type=\"{kind}\" class=\"adjusted\">\n          {resolution}\n"
     );
+
     for (name, value) in values {
         if value != 0.0 {
             let _ = writeln!(text, "          <{name}>{value:.16e}</{name}>");
         }
     }
+
     text.push_str("        </calibration>\n");
     if let Some(NearPlane { normal, distance_m }) = &camera.near {
         let [x, y, z] = [normal.x, normal.y, normal.z].map(|v| format!("{v:.16e}"));
@@ -118,6 +125,7 @@ fn sensor(id: usize, camera: &Camera, path: &Path) -> Result<String, CameraError
             "        <property name=\"{NEAR_PLANE}\" value=\"{x} {y} {z} {distance_m:.16e}\"/>"
         );
     }
+
     text.push_str("      </sensor>\n");
     Ok(text)
 }

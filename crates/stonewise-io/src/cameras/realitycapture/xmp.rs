@@ -33,6 +33,7 @@ pub fn read_sidecars(folder: &Path, photos: Option<&Path>) -> Result<CameraFile,
     paths.sort();
     let mut file = CameraFile::default();
     let mut sidecars = Vec::new();
+
     for path in &paths {
         let text = read_text(path)?;
         if !text.contains(NAMESPACE) {
@@ -46,11 +47,13 @@ pub fn read_sidecars(folder: &Path, photos: Option<&Path>) -> Result<CameraFile,
             None => file.skipped.push((name, Remark::NotAligned)),
         }
     }
+
     if sidecars.is_empty() {
         return Ok(file);
     }
     let names: Vec<&str> = sidecars.iter().map(|(name, _)| name.as_str()).collect();
     let sizes = PhotoSizes::below(photos.unwrap_or(folder), folder)?.of(&names)?;
+
     for ((name, sidecar), size) in sidecars.into_iter().zip(sizes) {
         file.views.push(View {
             image: ImageId(file.views.len() as u32),
@@ -59,6 +62,7 @@ pub fn read_sidecars(folder: &Path, photos: Option<&Path>) -> Result<CameraFile,
             cam_from_world: sidecar.pose,
         });
     }
+
     Ok(file)
 }
 

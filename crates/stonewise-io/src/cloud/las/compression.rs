@@ -37,17 +37,20 @@ impl Compression {
             )
         })?;
         let vlr = LazVlr::from_buffer(data).map_err(|e| las_error(path, las::Error::from(e)))?;
+
         // Summed here, because the library's sum of 16 bits overflows on damaged sizes.
         let size: u64 = vlr.items().iter().map(|item| u64::from(item.size())).sum();
         if size != envelope.record_bytes() {
             let reason = "the compression record does not fit the point format";
             return Err(CloudError::malformed(path, reason));
         }
+
         let order = match data[..] {
             [1, 0, ..] => Order::Stream,
             [2, 0, ..] => Order::Chunks,
             _ => Order::Layers,
         };
+
         // The decoder takes memory for layers that it has found no sizes of.
         if vlr
             .items()
@@ -58,6 +61,7 @@ impl Compression {
                 "the compression record mixes layers with points that have none: write the file again";
             return Err(CloudError::malformed(path, reason));
         }
+
         Ok(Some(Self { vlr, order }))
     }
 }

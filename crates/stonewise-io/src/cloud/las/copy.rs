@@ -57,6 +57,7 @@ impl RecordCopy {
         kept.retain(|dimension| !columns.names().any(|n| n.as_bytes() == dimension.name()));
         let base = usize::from(format.len() - format.extra_bytes);
         let mut copied: Vec<Range<usize>> = std::iter::once(0..base).collect();
+
         for dimension in &kept {
             let bytes = base + dimension.bytes.start..base + dimension.bytes.end;
             match copied.last_mut() {
@@ -64,6 +65,7 @@ impl RecordCopy {
                 _ => copied.push(bytes),
             }
         }
+
         let old: usize = kept.iter().map(|d| d.bytes.len()).sum();
         let extra_bytes = old + usize::from(columns.size());
         let record_bytes = u16::try_from(base + extra_bytes).map_err(|_| {
@@ -76,6 +78,7 @@ impl RecordCopy {
         })?;
         let mut descriptors: Vec<u8> = kept.iter().flat_map(|d| d.descriptor).collect();
         descriptors.extend(columns.descriptors(input)?);
+
         Ok(Self {
             columns,
             copied,

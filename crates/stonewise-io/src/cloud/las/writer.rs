@@ -95,15 +95,18 @@ fn write_end(file: &mut BufWriter<File>, header: Header) -> las::Result<()> {
         start_of_first_evlr: start,
         number_of_evlrs: u32::try_from(count)?,
     });
+
     if extended {
         // LAS 1.4: the counts of earlier versions are zero with point formats 6 and later.
         raw.number_of_point_records = 0;
         raw.number_of_points_by_return = [0; 5];
     }
+
     if names_keys {
         // The crate says that every file of the extended point formats names its system as WKT.
         raw.global_encoding &= !WKT_BIT;
     }
+
     // The crate widens the box by up to a step.
     [raw.min_x, raw.min_y, raw.min_z] = bounds.0;
     [raw.max_x, raw.max_y, raw.max_z] = bounds.1;

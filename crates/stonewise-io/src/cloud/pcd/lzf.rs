@@ -58,6 +58,7 @@ impl<R: Read> Lzf<R> {
                 Run::Copy(length + 2, back)
             };
         }
+
         let byte = match &mut self.next {
             Run::Copy(left, back) => {
                 *left -= 1;

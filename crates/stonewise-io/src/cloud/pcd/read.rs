@@ -169,6 +169,7 @@ impl Points {
             }
             Ok(())
         };
+
         match header.encoding {
             Encoding::Text => {
                 // A digit and a space or the end of the line for each value; the last line may have no end.

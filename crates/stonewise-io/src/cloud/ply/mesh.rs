@@ -21,15 +21,18 @@ pub fn read_mesh(path: &Path) -> Result<TriangleMesh, CloudError> {
     let mut lines = Lines::open(path)?;
     let header = Header::read(&mut lines)?;
     let has_faces = header.elements.iter().any(|e| face_list(e).is_some());
+
     if !has_faces {
         let reason =
             "the ply header has no element face with a list vertex_indices: give a mesh, not a cloud";
         return Err(CloudError::malformed(path, reason));
     }
+
     header.check_room(header.elements.len(), lines.bytes_left()?, path)?;
     let mut values = Values::after_header(lines, header.encoding);
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
     let (mut row, mut corners) = (Vec::new(), Vec::new());
+
     for element in &header.elements {
         let columns = Columns::find(element).filter(|_| element.name == "vertex");
         let list = face_list(element);
@@ -52,6 +55,7 @@ pub fn read_mesh(path: &Path) -> Result<TriangleMesh, CloudError> {
             }
         }
     }
+
     TriangleMesh::new(vertices, triangles).map_err(|e| CloudError::malformed(path, e.to_string()))
 }
 

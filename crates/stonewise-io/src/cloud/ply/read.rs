@@ -32,6 +32,7 @@ pub fn read<E: From<CloudError>>(
     let mut row = Vec::new();
     let (has_color, has_intensity) = (columns.color.is_some(), columns.intensity.is_some());
     let mut chunker = Chunker::new(chunk_points, has_color, has_intensity, visit);
+
     for element in before {
         for index in 0..element.count {
             if !values.next(path, element, &mut row)? {
@@ -41,6 +42,7 @@ pub fn read<E: From<CloudError>>(
             chunker.pass()?;
         }
     }
+
     for index in 0..vertex.count {
         if !values.next(path, vertex, &mut row)? {
             let reason = format!("it holds {index} of {} vertices", vertex.count);
@@ -48,6 +50,7 @@ pub fn read<E: From<CloudError>>(
         }
         chunker.push(columns.record(&row))?;
     }
+
     chunker.finish()
 }
 

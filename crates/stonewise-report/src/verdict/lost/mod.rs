@@ -37,6 +37,7 @@ pub(super) fn lost_stones(results: &ResultSet) -> Vec<bool> {
         return lost;
     }
     let squares = squares(&places);
+
     for (position, seen) in wall::core_points(results) {
         let at = results.facade.place(&position);
         for &number in squares.near(&at) {
@@ -46,12 +47,14 @@ pub(super) fn lost_stones(results: &ResultSet) -> Vec<bool> {
             }
         }
     }
+
     let wall = Wall::new(results);
     let margin_m = margin_m(results);
     for place in &mut places {
         place.judge(&wall, margin_m);
     }
     let covered = covered_holes(&places, &squares);
+
     for (place, is_covered) in places.iter().zip(covered) {
         let stone = &results.stones[place.stone];
         let is_gone = match place.state {
@@ -62,6 +65,7 @@ pub(super) fn lost_stones(results: &ResultSet) -> Vec<bool> {
         };
         lost[place.stone] = is_gone && is_well_seen(stone);
     }
+
     lost
 }
 

@@ -84,14 +84,17 @@ pub fn forward(x: &[f32], weight: &[f32], bias: Option<&[f32]>, geometry: &Geome
     let depth = geometry.inputs * geometry.taps();
     let weight = MatRef::from_row_major_slice(weight, geometry.outputs, depth);
     let mut y = vec![0.0f32; geometry.batch * geometry.outputs * pixels];
+
     if let Some(bias) = bias {
         let planes = y.par_chunks_mut(pixels.max(1)).enumerate();
         planes.for_each(|(plane, values)| values.fill(bias[plane % geometry.outputs]));
     }
+
     let least = LEAST_COLUMNS.div_ceil(columns.max(1));
     let rows_at_once = (BLOCK / (depth * columns).max(1)).clamp(least.min(rows.max(1)), rows.max(1));
     let image_size = geometry.inputs * geometry.rows * geometry.columns;
     let mut blocks = Vec::new();
+
     for (image, y) in y.chunks_mut((geometry.outputs * pixels).max(1)).enumerate() {
         let x = &x[image * image_size..][..image_size];
         let mut rest = MatMut::from_row_major_slice_mut(y, geometry.outputs, pixels);
@@ -102,6 +105,7 @@ pub fn forward(x: &[f32], weight: &[f32], bias: Option<&[f32]>, geometry: &Geome
             rest = after;
         }
     }
+
     blocks
         .into_par_iter()
         .for_each_init(Vec::new, |patches, (x, range, block)| {
@@ -152,6 +156,7 @@ pub fn backward(
                 }
             },
         );
+
     [x_grad, weight_grad]
 }
 
@@ -178,6 +183,7 @@ fn shares<'a>(
         .max(1);
     let mut rest = weight_grad;
     let mut shares: Vec<Share> = Vec::new();
+
     for start in (0..geometry.inputs).step_by(at_once) {
         let inputs = at_once.min(geometry.inputs - start);
         let (weight, after) = rest
@@ -191,12 +197,14 @@ fn shares<'a>(
             weight,
         });
     }
+
     for image in x_grad.chunks_mut((geometry.inputs * plane).max(1)) {
         let parts = image.chunks_mut((at_once * plane).max(1));
         parts
             .zip(&mut shares)
             .for_each(|(part, share)| share.x.push(part));
     }
+
     shares
 }
 

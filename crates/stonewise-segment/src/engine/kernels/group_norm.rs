@@ -28,6 +28,7 @@ pub fn forward(
     let pixels = group_size / per_group.max(1);
     let mut y = vec![0.0f32; x.len()];
     let arch = Arch::new();
+
     let normalise = |(place, (x, y)): (usize, (&[f32], &mut [f32]))| {
         arch.dispatch(
             #[inline(always)]
@@ -45,6 +46,7 @@ pub fn forward(
             },
         )
     };
+
     let parts = x
         .par_chunks(group_size.max(1))
         .zip(y.par_chunks_mut(group_size.max(1)));
@@ -60,6 +62,7 @@ pub fn backward(x: &[f32], scale: &[f32], grad: &[f32], moments: &[Moments], bat
     let group_size = x.len() / moments.len().max(1);
     let pixels = group_size / per_group.max(1);
     let mut x_grad = vec![0.0f32; x.len()];
+
     let differentiate = |(place, (x_grad, moments)): (usize, (&mut [f32], &Moments))| {
         let x = &x[place * group_size..][..group_size];
         let grad = &grad[place * group_size..][..group_size];
@@ -91,13 +94,16 @@ pub fn backward(x: &[f32], scale: &[f32], grad: &[f32], moments: &[Moments], bat
         }
         sums
     };
+
     let parts = x_grad.par_chunks_mut(group_size.max(1)).zip(moments);
     let sums: Vec<Vec<[f32; 2]>> = parts.enumerate().map(differentiate).collect();
     let (mut scale_grad, mut shift_grad) = (vec![0.0f32; channels], vec![0.0f32; channels]);
+
     for (plane, [total, product]) in sums.into_iter().flatten().enumerate() {
         shift_grad[plane % channels] += total;
         scale_grad[plane % channels] += product;
     }
+
     [x_grad, scale_grad, shift_grad]
 }
 

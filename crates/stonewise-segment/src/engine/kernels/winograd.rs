@@ -109,11 +109,13 @@ impl Layer<'_> {
         buffers.made.resize(PLACES * outputs * cells, 0.0);
         buffers.halves.resize(SIDE * CELL * cells, 0.0);
         buffers.pixels.resize(CELL * CELL * cells, 0.0);
+
         for input in 0..inputs {
             let [lines, transformed] = &mut buffers.lines;
             self.gather(input, &block, cells + LANES, lines);
             transform_image(lines, transformed, &mut buffers.seen, [input, inputs, cells]);
         }
+
         for place in 0..PLACES {
             let seen = &buffers.seen[place * inputs * cells..][..inputs * cells];
             let made = &mut buffers.made[place * outputs * cells..][..outputs * cells];
@@ -126,6 +128,7 @@ impl Layer<'_> {
                 Par::Seq,
             );
         }
+
         for output in 0..outputs {
             let bias = self.bias.map_or(0.0, |bias| bias[output]);
             let (halves, pixels) = (&mut buffers.halves, &mut buffers.pixels);

@@ -68,6 +68,7 @@ impl Backdrop {
             BackdropKind::Planks => tinted([0.50, 0.38, 0.28], rng),
             BackdropKind::Void => tinted([0.08, 0.08, 0.09], rng),
         };
+
         Self {
             kind,
             colour,
@@ -176,6 +177,7 @@ impl<'a> Texture<'a> {
         let [sin, cos] = self.across;
         let board = (px * cos + py * sin) / self.stripe_px;
         let seam = (board - board.round()).abs() * self.stripe_px;
+
         match self.backdrop.kind {
             BackdropKind::Sky => {
                 let cloud = if self.clouds {

@@ -87,9 +87,11 @@ impl Dirt {
                 count.hidden += u32::from(cover > HIDDEN);
             }
         }
+
         for _ in 0..self.marks {
             self.mark(canvas, rng);
         }
+
         for (label, doubtful) in canvas.label.iter_mut().zip(&mut canvas.doubtful) {
             let Covered { all, hidden } = covered[*label as usize];
             if *label != 0 && hidden as f32 > MAX_HIDDEN_SHARE * all as f32 {
@@ -222,6 +224,7 @@ impl Dirt {
             let at = middle[axis] * canvas.scale;
             (at - reach).max(0.0) as usize..((at + reach) as usize).min(count)
         };
+
         for y in range(1, canvas.height) {
             for x in range(0, canvas.width) {
                 let i = y * canvas.width + x;

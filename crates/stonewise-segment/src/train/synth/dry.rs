@@ -24,10 +24,12 @@ impl Wall {
                 };
             }
         }
+
         self.shape = StoneShape {
             missing: between(rng, 0.0, 0.03),
             ..StoneShape::random(rng, true)
         };
+
         // Soil or nothing lies in the gaps: darker than the stone, and darker still by their depth.
         let stone = self.material.colours.first().copied().unwrap_or([0.3; 3]);
         self.mortar = Mortar {
@@ -42,6 +44,7 @@ impl Wall {
         material.tone_spread *= between(rng, 0.0, 0.7);
         material.hue_spread *= 0.5;
         let relief = &mut material.relief;
+
         *relief = FaceRelief {
             bulge: between(rng, 0.0, 0.2),
             roughness: between(rng, 0.003, 0.035),

@@ -25,6 +25,7 @@ pub(super) fn finish(canvas: &Canvas, blur_px: f32, width: u32, height: u32) -> 
             doubt.data_mut()[to] = canvas.doubtful[from];
         }
     }
+
     let (numbers, parts) = connected_components(&labels);
     let mut areas = vec![0; canvas.stones as usize + 1];
     for part in &parts {
@@ -41,6 +42,7 @@ pub(super) fn finish(canvas: &Canvas, blur_px: f32, width: u32, height: u32) -> 
                 && part.area as f32 >= MIN_PART_SHARE * areas[part.label as usize] as f32
         })
         .collect();
+
     let mut compact = vec![0; areas.len()];
     let mut count = 0;
     for ((label, doubt), &number) in labels
@@ -64,6 +66,7 @@ pub(super) fn finish(canvas: &Canvas, blur_px: f32, width: u32, height: u32) -> 
         }
         *label = *name;
     }
+
     (labels, doubt)
 }
 

@@ -132,6 +132,7 @@ fn lay_courses(courses: &Courses, size: f32, extent: Extent, rng: &mut Rng) -> V
     let median_height = size / courses.aspect.sqrt();
     let mut cells = Vec::new();
     let mut top = extent[1] - between(rng, 0.0, median_height);
+
     while top < extent[3] {
         let height = median_height * (courses.height_spread * normal(rng)).clamp(-0.8, 0.8).exp();
         let bottom = top + height;
@@ -160,6 +161,7 @@ fn lay_courses(courses: &Courses, size: f32, extent: Extent, rng: &mut Rng) -> V
         }
         top = bottom;
     }
+
     cells
 }
 
@@ -209,6 +211,7 @@ fn lay_bricks(aspect: f32, pattern: BrickPattern, size: f32, extent: Extent, rng
     );
     let courses = ((extent[3] - y0) / height).ceil().max(1.0) as usize;
     let mut cells = Vec::new();
+
     for course in 0..courses {
         let odd = course % 2 == 1;
         let top = y0 + course as f32 * height;
@@ -232,6 +235,7 @@ fn lay_bricks(aspect: f32, pattern: BrickPattern, size: f32, extent: Extent, rng
             }
         }
     }
+
     cells
 }
 
@@ -251,6 +255,7 @@ fn lay_squared(aspect: f32, jitter: f32, size: f32, extent: Extent, rng: &mut Rn
         })
         .collect();
     let corner = |c: usize, r: usize| corners[r * (columns + 1) + c];
+
     let mut taken = vec![false; columns * rows];
     let mut cells = Vec::new();
     for r in 0..rows {
@@ -274,6 +279,7 @@ fn lay_squared(aspect: f32, jitter: f32, size: f32, extent: Extent, rng: &mut Rn
             ]);
         }
     }
+
     cells
 }
 

@@ -98,6 +98,7 @@ impl Light {
         let (width, height) = (canvas.width, canvas.height);
         let reach = Reach::new(canvas, towards);
         let mut radiance = vec![[0.0; 3]; width * height];
+
         for y in 0..height {
             let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
             for x in 0..width {
@@ -127,6 +128,7 @@ impl Light {
                     .map(|c: usize| albedo[c] * (direct * self.sun_colour[c] + sky * self.sky_colour[c]));
             }
         }
+
         radiance
     }
 }
@@ -213,6 +215,7 @@ impl CastShadow {
             Self::Foliage { size_px, .. } => Field::isotropic(rng, Grain::Fractal, size_px),
             _ => wave,
         };
+
         for y in 0..canvas.height {
             for x in 0..canvas.width {
                 let p = canvas.photo(x, y);

@@ -55,6 +55,7 @@ impl Masonry {
         let built = Built::new(self, canvas, view, region, rng);
         let first_label = canvas.stones + 1;
         let mut areas = vec![Area::default(); built.stones.len()];
+
         // A guess is good for a row of samples.
         for y in 0..canvas.height {
             let mut guess = None;
@@ -90,6 +91,7 @@ impl Masonry {
                 canvas.sky[i] = false;
             }
         }
+
         canvas.stones += built.stones.len() as u32;
         hide_covered(canvas, &areas, first_label);
     }
@@ -175,6 +177,7 @@ impl<'a> Built<'a> {
                     || (masonry.whole_stones && bend.is_none() && !centred_in(canvas, region, view, stone))
             })
             .collect();
+
         let wander = [0.9 * wall.stone_px, 0.9 * wall.stone_px, 0.25 * wall.stone_px]
             .map(|px| Field::isotropic(rng, Grain::Smooth, px));
         Self {
@@ -224,6 +227,7 @@ impl<'a> Built<'a> {
             let wave = self.wall.shape.ragged * self.stones[k].size * self.ragged.at(s + 71.0 * k as f32, t);
             distance - self.half_joint - shift + wave - self.surface.smear(u, v, stone_px)
         });
+
         // Coverage of the sample by the stone: the outline is straight on this scale.
         let coverage = (inside * place.samples + 0.5).clamp(0.0, 1.0);
         let (mut albedo, mut height) = if coverage < 1.0 {
@@ -231,6 +235,7 @@ impl<'a> Built<'a> {
         } else {
             ([0.0; 3], 0.0)
         };
+
         if let Some((k, _)) = found.filter(|_| coverage > 0.0) {
             let stone = &self.stones[k];
             let offset = [s - stone.centre[0], t - stone.centre[1]];
@@ -240,6 +245,7 @@ impl<'a> Built<'a> {
             albedo = mix(albedo, colour, coverage);
             height += coverage * (face - height);
         }
+
         let edge = (0.3 * self.half_joint).max(0.7);
         let open = smoothstep(-self.half_joint.max(0.5), edge, inside);
         Painted {

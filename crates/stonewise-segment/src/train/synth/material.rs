@@ -105,6 +105,7 @@ impl Material {
         } else {
             1.0
         };
+
         // Fieldstones of every origin, or the stones of one or two quarries.
         let is_mixed = chance(rng, 0.3);
         let mut colours = vec![stone_colour(rng)];
@@ -113,10 +114,12 @@ impl Material {
         } else {
             usize::from(chance(rng, 0.25)) + usize::from(chance(rng, 0.15))
         };
+
         for _ in 0..others {
             let other = mix(colours[0], stone_colour(rng), between(rng, 0.2, 1.0));
             colours.push(other);
         }
+
         let spread = if is_mixed {
             between(rng, 0.4, 1.0)
         } else {
@@ -180,6 +183,7 @@ impl Mortar {
             ),
             _ => grey,
         };
+
         let hairline = chance(rng, 0.25);
         let width = if hairline {
             between(rng, 0.0, 1.0) / stone_px
@@ -191,6 +195,7 @@ impl Mortar {
             p if p < 0.75 => between(rng, 0.005, 0.04),
             _ => between(rng, 0.03, 0.1),
         };
+
         Self {
             colour: colour.map(|c| c.clamp(0.01, 0.92)),
             width,
@@ -315,12 +320,14 @@ impl Surface {
             let (sin, cos) = angle.sin_cos();
             [from[0], from[1], cos, sin, size * between(rng, 0.0, 0.2)]
         });
+
         let shade = (0.3 * normal(rng)).exp();
         let facets = if material.relief.facets > 0.0 {
             facets(material.relief.facets, size, rng)
         } else {
             Vec::new()
         };
+
         Look {
             colour,
             accent: [0, 1, 2].map(|c: usize| {
@@ -376,30 +383,36 @@ impl Surface {
             + rough
             + relief.bulge * size * (1.0 - falling(depth / (0.45 * size)))
             - relief.worn * size * falling(depth / (0.15 * size));
+
         let planes = look.facets.iter();
         let lowest = planes
             .map(|p| p[0] * offset[0] + p[1] * offset[1] + p[2])
             .reduce(f32::min);
         height += lowest.unwrap_or(0.0);
+
         if m.bedding > 0.0 {
             let layer = self.bedding.at(x, y);
             tone += m.bedding * layer;
             height += 0.6 * relief.fine_px * layer;
         }
+
         if m.veins != 0.0 {
             tone *= 1.0 + m.veins * smoothstep(0.06, 0.02, self.accent.at(y, x).abs());
         }
         if m.speckle > 0.0 {
             tone += m.speckle * self.speckle.at(x, y);
         }
+
         if m.pits > 0.0 {
             let pit = smoothstep(m.pits, 0.5 * m.pits, self.pits.at(x, y)) * smoothstep(-0.3, 0.8, coarse);
             tone *= 1.0 - 0.5 * pit;
             height -= 0.15 * m.pits * m.pits_px * pit;
         }
+
         if relief.tooling_px > 0.0 {
             height += relief.tooling_px * self.tooling.at(x, y);
         }
+
         if let Some([px, py, dx, dy, beyond]) = look.crack {
             let (rx, ry) = (place[0] - px, place[1] - py);
             let along = rx * dx + ry * dy;
@@ -408,6 +421,7 @@ impl Surface {
             let dark = smoothstep(width + 0.5, (width - 0.5).max(0.0), across.abs());
             tone *= 1.0 - 0.7 * dark * smoothstep(0.0, 0.3, width);
         }
+
         let colour = if m.accent > 0.0 {
             mix(
                 look.colour,
@@ -422,6 +436,7 @@ impl Surface {
         } else {
             look.colour
         };
+
         (scaled(colour, tone.max(0.1)), height)
     }
 

@@ -123,6 +123,7 @@ impl Object {
                 [radius, radius * between(rng, 0.6, 1.4)]
             }
         };
+
         let any = |rng: &mut Rng| {
             let grey = between(rng, 0.05, 0.9);
             [0, 1, 2].map(|_| linear_from_srgb((grey * (0.35 * normal(rng)).exp()).clamp(0.02, 0.95)))
@@ -146,6 +147,7 @@ impl Object {
             }
             _ => [any(rng), any(rng)],
         };
+
         Self {
             kind,
             centre: [between(rng, 0.0, 1.0), between(rng, 0.0, 1.0)],

@@ -24,6 +24,7 @@ pub(super) fn lay_rubble(
     let sites = scatter(coarse, mixture, disorder, frame, rng);
     let reach = 2.2 * coarse;
     let bins = Bins::new(&sites, reach, frame);
+
     sites
         .iter()
         .enumerate()

@@ -235,6 +235,7 @@ fn arched(wall: Wall, viewpoint: Viewpoint, shorter: f32, rng: &mut Rng) -> Vec<
     };
     voussoirs.stone_px = depth_px;
     voussoirs.mortar.width *= (wall.stone_px / depth_px).min(1.0);
+
     let inside = if chance(rng, 0.25) {
         let content = Wall::random(rng, STONE_PX[0], wall.stone_px.max(STONE_PX[0] + 1.0));
         layer(
@@ -249,6 +250,7 @@ fn arched(wall: Wall, viewpoint: Viewpoint, shorter: f32, rng: &mut Rng) -> Vec<
     } else {
         layer(Region::Everywhere, Masonry::plain(wall, viewpoint))
     };
+
     let ring = Masonry {
         whole_stones: true,
         ring: Some(Ring {
@@ -285,6 +287,7 @@ fn ruins(viewpoint: Viewpoint, stone_px: f32, rng: &mut Rng) -> Vec<Layer> {
             Backdrop::of(BackdropKind::Ground, rng),
         ),
     ];
+
     let first = Wall::random(rng, 0.7 * stone_px, stone_px);
     let count = 2 + (between(rng, 0.0, 4.0) as usize);
     for k in 0..count {
@@ -319,6 +322,7 @@ fn ruins(viewpoint: Viewpoint, stone_px: f32, rng: &mut Rng) -> Vec<Layer> {
         };
         layers.push(layer(Region::Polygon(corners), content));
     }
+
     layers
 }
 

@@ -72,6 +72,7 @@ impl Stone {
                 (length.abs() > 1e-3).then(|| [normal[0], normal[1], -normal[0] * a[0] - normal[1] * a[1]])
             })
             .collect();
+
         let limit = |axis: usize, pick: fn(f32, f32) -> f32, start: f32| {
             ring.iter().map(|p| p[axis]).fold(start, pick)
         };
@@ -84,6 +85,7 @@ impl Stone {
             Vec::new()
         };
         let rounding = (shape.rounding * size * between(rng, 0.6, 1.2)).max(1e-3);
+
         Some(Self {
             edges,
             bounds: [
@@ -160,6 +162,7 @@ impl StoneIndex {
                 bounds[axis + 2] = bounds[axis + 2].max(stone.bounds[axis + 2]);
             }
         }
+
         let count = |axis: usize| {
             let length = (bounds[axis + 2] - bounds[axis]).max(0.0);
             (length / side) as usize + 1
@@ -169,6 +172,7 @@ impl StoneIndex {
         let square =
             |value: f32, axis: usize, most: usize| (((value - origin[axis]) / side) as usize).min(most - 1);
         let mut squares: Vec<Vec<u32>> = vec![Vec::new(); columns * rows];
+
         for (i, stone) in stones.iter().enumerate() {
             for r in square(stone.bounds[1], 1, rows)..=square(stone.bounds[3], 1, rows) {
                 for c in square(stone.bounds[0], 0, columns)..=square(stone.bounds[2], 0, columns) {
@@ -176,12 +180,14 @@ impl StoneIndex {
                 }
             }
         }
+
         let mut starts = vec![0];
         let mut items = Vec::new();
         for square in squares {
             items.extend(square);
             starts.push(items.len() as u32);
         }
+
         Self {
             origin,
             side,
@@ -211,6 +217,7 @@ impl StoneIndex {
                 return Some((guess, distance));
             }
         }
+
         let (c, r) = ((x - self.origin[0]) / self.side, (y - self.origin[1]) / self.side);
         if c < 0.0 || r < 0.0 || c as usize >= self.columns || r as usize >= self.rows {
             return None;
@@ -218,6 +225,7 @@ impl StoneIndex {
         let square = r as usize * self.columns + c as usize;
         let near = &self.items[self.starts[square] as usize..self.starts[square + 1] as usize];
         let mut best = None;
+
         // Points in the corners of joints lie a little outside of every stone.
         let mut deepest = -self.side;
         for &i in near {
@@ -227,6 +235,7 @@ impl StoneIndex {
                 best = Some((i as usize, distance));
             }
         }
+
         best
     }
 }

@@ -115,6 +115,7 @@ impl Survey {
         } else {
             1.0
         };
+
         let (spacing, noise) = (self.spacing_m * unit, self.noise_m * unit);
         let holes = Field::isotropic(&mut rng, Grain::Fractal, 0.4 * size[0].max(size[1]) as f32);
         let waves = Field::isotropic(&mut rng, Grain::Fractal, 40.0);
@@ -124,6 +125,7 @@ impl Survey {
         let [width, height] = size.map(|side| side as f32);
         let count = (per_pixel * width * height) as usize;
         let mut range = RangeImage::new(&scene.camera);
+
         for _ in 0..count {
             let place = [between(&mut rng, 0.0, width), between(&mut rng, 0.0, height)];
             if self.gaps > 0.0 && holes.at(place[0], place[1]) < threshold {
@@ -143,6 +145,7 @@ impl Survey {
             let shown = [0, 1].map(|axis| f64::from(place[axis] + self.shift_px[axis]));
             range.add(shown, f64::from(depth));
         }
+
         range.relief()
     }
 
@@ -203,6 +206,7 @@ impl Scene {
             .find_map(viewpoint)
             .unwrap_or(Viewpoint::FRONTAL);
         let focal_px = main.focal * size[0].max(size[1]) as f32;
+
         let plane = |viewpoint: &Viewpoint| {
             let turned = Viewpoint {
                 focal: main.focal,
@@ -211,6 +215,7 @@ impl Scene {
             };
             View::new(&turned, size[0], size[1]).plane(focal_px) / pixel_m
         };
+
         let on_the_wall = Piece {
             plane: plane(&main),
             off_m: 0.0,
@@ -218,6 +223,7 @@ impl Scene {
             is_empty: false,
         };
         let mut pieces = vec![on_the_wall];
+
         for (i, layer) in style.layers.iter().enumerate() {
             let own = viewpoint(layer).map_or(on_the_wall.plane, |v| plane(&v));
             let off_m = if i == 0 {
@@ -235,6 +241,7 @@ impl Scene {
                 Content::Backdrop(backdrop) => piece.backdrop(backdrop, rng),
             });
         }
+
         pieces.extend(style.objects.iter().map(|object| on_the_wall.object(object, rng)));
         Self {
             camera: Camera::pinhole(size[0], size[1], f64::from(focal_px)),

@@ -83,6 +83,7 @@ impl View {
             size,
         };
         let mut strength = 1.0;
+
         // With no obliqueness left the ratio is 1, so this ends.
         while strength > 0.05 {
             view.turn(viewpoint, strength);
@@ -98,6 +99,7 @@ impl View {
             }
             strength *= 0.8;
         }
+
         view.turn(viewpoint, 0.0);
         view
     }

@@ -37,6 +37,7 @@ pub(super) fn datasets() -> Vec<Dataset> {
         coefficients: coefficients.to_vec(),
         residual_sd,
     };
+
     let tenths = [1.0, 0.1, 0.01, 0.001, 0.0001, 0.00001];
     vec![
         Dataset {

@@ -36,6 +36,7 @@ pub(super) fn figures(
     let quiet = Quiet(progress);
     progress.begin("the survey's own scans", 3);
     let halves = halves_of(project, project.epochs.reference(), seed, store, &quiet)?;
+
     let run = |name: &str, motion: Option<MotionField>| -> Result<Summary> {
         let mut halves = halves.clone();
         halves.epochs[EpochId::at(1)].motion = motion;
@@ -44,6 +45,7 @@ pub(super) fn figures(
         progress.advance(1);
         Ok(summary)
     };
+
     let still = run("still", None)?;
     let rows = still.pairs.first().map(|p| p.rows.as_slice()).unwrap_or_default();
     let motions = || rows.iter().filter_map(|r| r.motion.as_ref());
@@ -62,12 +64,14 @@ pub(super) fn figures(
             MOST_ALARMS,
         ),
     ];
+
     let stones = first_stones(&Context::with_store(
         &halves,
         &out.join("own/still"),
         Arc::clone(store),
         &quiet,
     )?)?;
+
     for (motion, least) in paper_motions(&stones)?.into_iter().zip(LEAST_FOUND) {
         let length = TIMES * limit;
         let bad = |e: stonewise_core::evaluate::MotionFieldError| Error::Survey(e.to_string());
@@ -109,5 +113,6 @@ pub(super) fn figures(
             rmse,
         ));
     }
+
     Ok(figures)
 }

@@ -50,9 +50,11 @@ pub(super) fn figures(
         walls.push(measured(options.seed, number, out, store, progress)?);
         progress.advance(1);
     }
+
     let stones: usize = walls.iter().map(|w| w.score.estimated).sum();
     let note = format!("{stones} stones of {} walls", walls.len());
     let mut figures = Vec::new();
+
     for (axis, name) in ["along the wall", "up the face", "out of the face"]
         .into_iter()
         .enumerate()
@@ -80,6 +82,7 @@ pub(super) fn figures(
                 .with("all stones of a wall share one error of registration, so that each wall is one draw"),
         );
     }
+
     let still: Vec<&Wall> = walls.iter().filter(|w| w.is_still).collect();
     let alarms = still.iter().filter(|w| w.called > 0).count();
     figures.push(
@@ -96,6 +99,7 @@ pub(super) fn figures(
         count(|s| s.significance.detectable),
         count(|s| s.significance.detectable_hits),
     );
+
     if beyond > 0 {
         figures.push(
             Figure::at_least(
@@ -107,6 +111,7 @@ pub(super) fn figures(
             .with(format!("{found} of {beyond}")),
         );
     }
+
     Ok(figures)
 }
 

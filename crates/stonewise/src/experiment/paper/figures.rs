@@ -50,6 +50,7 @@ pub(super) fn translation_scatter(case: &Case) -> [Plot; 2] {
         Some(in_plane(&displacement, &p.position))
     });
     let middle = results.stones.first().map_or(Point3::origin(), |s| s.centroid);
+
     let truth = in_plane(&case.motion.field.displacement_at(&middle), &middle);
     let reach = 1.6e3 * case.motion.field.largest_m();
     let plot = |title: &str, points: Vec<[f64; 2]>, radius_px: f64, colour: &str| {
@@ -69,6 +70,7 @@ pub(super) fn translation_scatter(case: &Case) -> [Plot; 2] {
         plot.add(Item::Cross(truth));
         plot
     };
+
     [
         plot(
             &format!("(a) stones, {}", case.survey),
@@ -94,6 +96,7 @@ pub(super) fn bulge_maps(case: &Case) -> Option<[Plot; 2]> {
     };
     let middle = results.facade.place(&centre);
     let half = 0.7 * diameter_m;
+
     let map = |title: String| {
         Plot::map(
             &title,
@@ -103,6 +106,7 @@ pub(super) fn bulge_maps(case: &Case) -> Option<[Plot; 2]> {
             Some((ramp, "mm".to_owned())),
         )
     };
+
     let near = |p: &Point3<f64>| (p - centre).norm() < 1.2 * diameter_m;
     let mut stones = map(format!("(a) stones, {}: out of the face", case.survey));
     let areas = results
@@ -117,6 +121,7 @@ pub(super) fn bulge_maps(case: &Case) -> Option<[Plot; 2]> {
             (ring(results, row), colour)
         });
     stones.add(Item::Areas(areas.collect()));
+
     let mut core = map(format!("(b) M3C2, {}: distance", case.survey));
     core.add(Item::Areas(cells(results, &ramp, 2.0 * half, near)));
     Some([stones, core])
@@ -138,6 +143,7 @@ pub(super) fn bulge_profile(case: &Case) -> Option<Plot> {
         .iter()
         .filter_map(|row| Some([on_line(&row.centroid)?, 1e3 * row.motion.as_ref()?.face.z]))
         .collect();
+
     let core: Vec<[f64; 2]> = results
         .distances
         .iter()
@@ -152,6 +158,7 @@ pub(super) fn bulge_profile(case: &Case) -> Option<Plot> {
         })
         .collect();
     let heights = stones.iter().chain(&truth).map(|p| p[1]);
+
     let mut plot = Plot::new(
         &format!("Profile through the bulge, {}", case.survey),
         Axis::linear(
@@ -168,6 +175,7 @@ pub(super) fn bulge_profile(case: &Case) -> Option<Plot> {
         radius_px: 1.0,
         name: "M3C2".to_owned(),
     });
+
     plot.add(Item::Line {
         points: truth,
         colour: "#000".to_owned(),

@@ -115,12 +115,14 @@ pub(super) fn variants(influence: Influence) -> Vec<Variant> {
         change,
         x,
     };
+
     let along = |values: &[f64], scale: f64, change: fn(f64) -> Change| -> Vec<Variant> {
         values
             .iter()
             .map(|v| variant("", change(*v), scale * v))
             .collect()
     };
+
     match influence {
         Influence::Masks => {
             let kinds: [(&str, Vec<MaskError>); 5] = [

@@ -52,6 +52,7 @@ pub fn tune(project: &Project, options: &TuneOptions, out: &Path, progress: &dyn
         ..project.clone()
     };
     let cases = cases(&whole, options.seed, &store, out, progress)?;
+
     progress.begin("tune", values.len() as u64);
     let points = in_parallel(values.len(), |i| {
         progress.check()?;
@@ -70,6 +71,7 @@ pub fn tune(project: &Project, options: &TuneOptions, out: &Path, progress: &dyn
             Ok(worth)
         })
         .collect::<Result<_>>()?;
+
     let best = recommended(&ranked);
     let tuned = Tuned {
         front: front(&ranked),
@@ -129,6 +131,7 @@ fn measure(
     };
     let name: Vec<String> = values.iter().map(|v| v.to_string().replace('"', "")).collect();
     let mut scores = Vec::new();
+
     for (number, (_, case)) in (1..).zip(cases) {
         let settings = settings_with(&case.settings, &changes(grid, values))?;
         let project = Project {
@@ -152,6 +155,7 @@ fn measure(
         point.measured += share * pair.rows.iter().filter(|r| r.motion.is_some()).count() as f64;
         scores.extend(pair.evaluation.and_then(|e| e.stones));
     }
+
     if point.failure.is_none() {
         point.errors = PointErrors::of(&scores);
     }

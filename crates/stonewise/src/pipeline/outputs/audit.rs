@@ -69,6 +69,7 @@ impl AuditRow {
             share: None,
             points: None,
         };
+
         match event {
             AuditEvent::SplitInstance {
                 photo,

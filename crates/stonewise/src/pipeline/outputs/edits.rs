@@ -20,6 +20,7 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
     };
     write_readable_json(&context.out.join(FACADE), &edited.facade)?;
     let mut rows = Vec::new();
+
     for (index, edit) in file.edits.iter().enumerate() {
         let mut reasons = Vec::new();
         for (epoch, effects) in context.project.epochs.iter().zip(&edited.effects) {
@@ -38,6 +39,7 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
             context.warnings.skipped("edit", file.place(index), message);
         }
     }
+
     let edit = |row: &Row| &file.edits[row.0];
     let text = |of: &dyn Fn(&Row) -> String| rows.iter().map(|r| one_line(&of(r))).collect::<Vec<_>>();
     let done = |row: &Row| row.2.as_ref().ok().cloned();
@@ -52,6 +54,7 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
     let meaning = "merge, split, delete, add or ignore";
     table.push("do", "", meaning, text(&|r| edit(r).action.word().to_owned()))?;
     table.push("who", "", "who made the edit", text(&|r| edit(r).who.clone()))?;
+
     table.push("when", "", "when it was made", text(&|r| edit(r).when.clone()))?;
     table.push("why", "", "why it was made", text(&|r| edit(r).why.clone()))?;
     let meaning = "the file of edits and the place in it";
@@ -66,6 +69,7 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
     let before = stones(&|e| e.before);
     table.push("stones_before", "", "stones that the edit changed", before)?;
     let after = stones(&|e| e.after);
+
     table.push("stones_after", "", "stones that the edit made or changed", after)?;
     let meaning = "points whose label changed; empty where the edit had no effect";
     table.push("points", "", meaning, points)?;
@@ -75,6 +79,7 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
         "why it did nothing in this epoch; empty where it did something",
         text(&|r| r.2.as_ref().err().map_or(String::new(), NoEffect::to_string)),
     )?;
+
     Ok(write_csv(
         &context.out.join(EDITS_AUDIT),
         &table,

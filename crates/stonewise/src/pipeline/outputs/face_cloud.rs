@@ -57,6 +57,7 @@ fn write_face_cloud(context: &Context, first: &Labelled, rows: &[StoneRow]) -> R
     };
     let crs = coordinate_system(context.project)?;
     let crs = crs.map(|c| c.text());
+
     write_coloured_laz(
         &context.out.join(FILE),
         &bounds,

@@ -32,6 +32,7 @@ fn write_run_record(run: &Run) -> Result<()> {
         let name = context.project.epochs[later].name.clone();
         datum.insert(name, run.measured(later)?.datum.state);
     }
+
     let project = context.project;
     let record = RunRecord {
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -72,6 +73,7 @@ fn write_run_record(run: &Run) -> Result<()> {
         steps: context.times(),
         warnings: context.warnings.recorded(project.settings.report.language),
     };
+
     write_readable_json(&context.out.join(RUN), &record)
 }
 

@@ -78,10 +78,12 @@ fn write_series(run: &Run) -> Result<()> {
     let project = context.project;
     let tracked = run.tracked()?;
     let mut all = Vec::new();
+
     for later in project.epochs.later_ids() {
         all.extend(of_reference(run, &tracked, later)?);
         all.extend(of_tracks(run, &tracked, later)?);
     }
+
     let name = |epoch: EpochId| project.epochs[epoch].name.clone();
     let mut series = Table::new();
     let names: Vec<String> = all.iter().map(|r| name(r.epoch)).collect();
@@ -96,18 +98,21 @@ fn write_series(run: &Run) -> Result<()> {
     let meaning = "what the epoch shows of the stone: seen, hidden, changed, lost, replaced, new; `status` says why there is no motion";
     series.push("state", "", meaning, states)?;
     let previous: Vec<Option<Matrix3<f64>>> = all.iter().map(|r| r.previous).collect();
+
     let rows: Vec<StoneRow> = all.into_iter().map(|r| r.row).collect();
     let stones = stone_table(&rows)?;
     for (name, column) in stones.columns() {
         let (unit, meaning) = stones.description(name).unwrap_or_default();
         series.push(name, unit, meaning, column.clone())?;
     }
+
     for (r, c, end) in UPPER {
         let meaning = "covariance of the difference of the displacement from that of the epoch before; empty where that \
                        did not measure the stone";
         let cells: Vec<Option<f64>> = previous.iter().map(|m| m.map(|m| m[(r, c)])).collect();
         series.push(&format!("cov_prev_{end}"), "m2", meaning, cells)?;
     }
+
     Ok(write_parquet(&context.out.join(FILE), &series)?)
 }
 
@@ -145,6 +150,7 @@ fn of_tracks(run: &Run, tracked: &Tracked, later: EpochId) -> Result<Vec<SeriesR
         deformed.insert(pair.epochs.first, pair_deformations(run, pair)?);
     }
     let mut rows = Vec::new();
+
     for stone in tracked.stones.iter().filter(|s| place(s.since) < place(later)) {
         let measured = pair(Pair::new(stone.since, later));
         let found = measured.and_then(|p| p.rows.iter().find(|r| r.stone_id == stone.stone.id.0));
@@ -194,6 +200,7 @@ fn of_tracks(run: &Run, tracked: &Tracked, later: EpochId) -> Result<Vec<SeriesR
             previous,
         });
     }
+
     Ok(rows)
 }
 

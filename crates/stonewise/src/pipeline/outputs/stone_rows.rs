@@ -32,10 +32,12 @@ pub fn stone_rows(
     let deformed = registered.deformation.iter().flat_map(|d| &d.stones);
     let deformed: BTreeMap<_, _> = deformed.map(|s| (s.stone, s)).collect();
     let relative = registered.relative_errors();
+
     // Stones turn with the rigid part of the error; how its drifts turn single stones is not estimated.
     let turn = registered.epoch_errors.as_ref();
     let turn: Vector3<f64> =
         turn.map_or_else(Vector3::zeros, |e| e.rigid.error.fixed_rows::<3>(3).into_owned());
+
     let row = |stone: &Stone| {
         let outcome = outcomes.get(&stone.id)?;
         let partner = match outcome {
@@ -74,6 +76,7 @@ pub fn stone_rows(
             ..row
         })
     };
+
     first.iter().filter_map(row).collect()
 }
 

@@ -44,6 +44,7 @@ fn write_zones(run: &Run) -> Result<()> {
             });
         }
     }
+
     let reals = |of: fn(&Row) -> f64| rows.iter().map(of).collect::<Vec<f64>>();
     let mut table = Table::new();
     let epochs: Vec<String> = rows.iter().map(|r| r.epoch.clone()).collect();
@@ -61,6 +62,7 @@ fn write_zones(run: &Run) -> Result<()> {
         "area of the faces of its stones",
         reals(|r| r.place.area_m2),
     )?;
+
     table.push(
         "along_m",
         "m",
@@ -79,6 +81,7 @@ fn write_zones(run: &Run) -> Result<()> {
         "largest deformation of a stone",
         reals(|r| r.largest_m),
     )?;
+
     table.push(
         "lower_m",
         "m",
@@ -98,5 +101,6 @@ fn write_zones(run: &Run) -> Result<()> {
         "what it resembles: bulge, dent, tilt, settlement, heave or slide",
         kinds,
     )?;
+
     Ok(write_parquet(&context.out.join(FILE), &table)?)
 }

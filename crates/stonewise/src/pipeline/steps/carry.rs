@@ -222,6 +222,7 @@ fn carry_into(
         settings.label.missed_weight,
         settings.label.min_points,
     );
+
     let key = Key::new("carry", &(params, &wishes), &keys);
     let step = context.step(&format!("carry-{epoch}"), key, |step, _| {
         let mut target = DiskLabels::new(step.path(), &own.ingested.tiles.surveyed);
@@ -229,6 +230,7 @@ fn carry_into(
         write_json(&step.file(REPORT), &report)
     })?;
     let report: CarryReport = read_json(&step.file(REPORT))?;
+
     let attempt = |(wish, outcome): (&Wish, &Outcome)| CarryAttempt {
         epoch,
         from: wish.from,
@@ -237,6 +239,7 @@ fn carry_into(
         missed: wish.missed,
         outcome: outcome.clone(),
     };
+
     let attempts = wishes.iter().zip(&report.outcomes).map(attempt).collect();
     if report.tiles.is_empty() {
         return Ok(Carried {
@@ -244,12 +247,14 @@ fn carry_into(
             ..Carried::unchanged(own)
         });
     }
+
     let (mut store, mut transfer) = (own.store.clone(), own.transfer.clone());
     store.replace(
         &report.tiles,
         &DiskLabels::new(step.path(), &own.ingested.tiles.surveyed),
     );
     let mut carried = own.carried.clone();
+
     for (wish, found) in wishes.iter().zip(&report.outcomes) {
         if let Ok(found) = found {
             let stone = StoneId(found.stone);
@@ -258,12 +263,14 @@ fn carry_into(
             transfer.stones.push(StoneInstances { stone, instances });
         }
     }
+
     let labels = Labels {
         transfer,
         store,
         step,
     };
     let tabulated = tabulate(run, epoch, "stones-carried", labels)?;
+
     Ok(Carried {
         labelled: Arc::new(Labelled { carried, ..tabulated }),
         attempts,
@@ -301,6 +308,7 @@ fn look_for(
         &settings.carry,
         context.progress,
     )?;
+
     let mut of_placed = found.outcomes.into_iter().peekable();
     let mut outcome = |wish: &Wish| {
         let is_placed = shapes.contains_key(&(wish.from, wish.stone));
@@ -313,6 +321,7 @@ fn look_for(
             }),
         }
     };
+
     Ok(CarryReport {
         outcomes: wishes.iter().map(&mut outcome).collect(),
         tiles: found.tiles,

@@ -42,6 +42,7 @@ pub fn look(context: &Context, forced: bool) -> Result<()> {
         require_memory_of_run(project)?;
     }
     let mut inputs = Vec::new();
+
     for epoch in &project.epochs {
         for cloud in &epoch.clouds {
             inputs.push(context.digest(cloud)?);
@@ -50,6 +51,7 @@ pub fn look(context: &Context, forced: bool) -> Result<()> {
             inputs.extend([context.digest(&photos.cameras)?, listing(&photos.images)?]);
         }
     }
+
     let names: Vec<&String> = project.epochs.iter().map(|e| &e.name).collect();
     let key = Key::new(
         STEP,
@@ -66,12 +68,14 @@ pub fn look(context: &Context, forced: bool) -> Result<()> {
         .filter(|f| f.verdict == Verdict::Wrong)
         .map(|f| format!("  {} {}: {}", f.epoch, f.topic, f.text))
         .collect();
+
     if !wrong.is_empty() && !forced {
         return Err(Error::Check(format!(
             "this survey cannot be right (--force goes on all the same; `stonewise check` shows more):\n{}",
             wrong.join("\n")
         )));
     }
+
     for finding in about_survey() {
         let subject = if finding.epoch.is_empty() {
             &project.name
@@ -80,6 +84,7 @@ pub fn look(context: &Context, forced: bool) -> Result<()> {
         };
         context.warnings.doubt(STEP, subject, finding.said());
     }
+
     for finding in report.doubtful().filter(|f| is_about_this_machine(f)) {
         context.progress.note(&finding.said().english);
     }

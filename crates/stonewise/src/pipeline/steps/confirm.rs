@@ -132,6 +132,7 @@ fn without(
     let changed: BTreeSet<usize> = read_json(&step.file(TILES))?;
     let (mut store, mut transfer) = (own.store.clone(), own.transfer.clone());
     store.replace(&changed, &DiskLabels::new(step.path(), tiles));
+
     transfer.stones.retain(|s| !stones.contains(&s.stone));
     let mut carried = own.carried.clone();
     carried.retain(|stone, _| !stones.contains(stone));
@@ -140,6 +141,7 @@ fn without(
         store,
         step,
     };
+
     Ok(Arc::new(Labelled {
         carried,
         ..tabulate(run, epoch, "stones-confirmed", labels)?

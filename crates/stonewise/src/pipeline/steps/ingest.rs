@@ -75,6 +75,7 @@ fn ingest(context: &Context, id: EpochId) -> Result<Ingested> {
         &(&context.project.settings.ingest, part, epoch.sources, keeps),
         &inputs,
     );
+
     let step = context.step(&format!("ingest-{id}"), key, |step, warnings| {
         let takes_part = |p: &Point3<f64>| part.as_ref().is_none_or(|part| part.contains(p));
         let invalid = cut_into_tiles(
@@ -91,10 +92,12 @@ fn ingest(context: &Context, id: EpochId) -> Result<Ingested> {
         }
         Ok(())
     })?;
+
     let tiles = EpochTiles {
         surveyed: DiskTiles::open(step.path())?,
         motion: epoch.motion.clone(),
     };
+
     if tiles.tile_count() == 0 {
         return Err(Error::Survey(format!(
             "the clouds of epoch {:?} hold no points{}",
@@ -106,5 +109,6 @@ fn ingest(context: &Context, id: EpochId) -> Result<Ingested> {
             }
         )));
     }
+
     Ok(Ingested { step, tiles })
 }

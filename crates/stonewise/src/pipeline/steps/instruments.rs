@@ -71,10 +71,12 @@ pub fn compare(
         let differences = beside.iter().filter(|b| which(b)).map(|b| b.difference.clone());
         agreement(&differences.collect::<Vec<_>>(), &centre, known.as_ref())
     };
+
     if let Some(all) = with(&|_| true) {
         record.p = all.p;
         record.compared = compared(&beside, &all);
     }
+
     let in_use = with(&|b| b.file.is_used);
     record.datum = in_use.as_ref().map(use_of);
     if let Some(found) = in_use.filter(|_| record.datum == Some(DatumUse::Observed)) {
@@ -87,6 +89,7 @@ pub fn compare(
             project.settings.report.language,
         );
     }
+
     Some(record)
 }
 
@@ -135,6 +138,7 @@ fn beside<'a>(
             });
         }
     }
+
     all
 }
 
@@ -254,6 +258,7 @@ fn update(shown: Before, error: &RegistrationError, normals: &Normals, count: us
     datum.taken_off = Some((shown.taken_off + error.mean).into());
     let rotation_before = before.rotation_covariance().unwrap_or_else(Matrix3::zeros);
     let rotation_after = datum.rotation_covariance().unwrap_or_else(Matrix3::zeros);
+
     for row in shown.rows {
         let (Some(motion), Some(normal)) = (&row.motion, normals.get(&StoneId(row.stone_id))) else {
             continue;
@@ -273,5 +278,6 @@ fn update(shown: Before, error: &RegistrationError, normals: &Normals, count: us
         };
         row.motion = Some(alone.against(normal, &reference));
     }
+
     *shown.datum = datum;
 }

@@ -237,6 +237,7 @@ fn join_into(
         )?;
         write_json(&step.file(REPORT), &report)
     })?;
+
     let report: JoinReport = read_json(&step.file(REPORT))?;
     if report.joined.is_empty() {
         return Ok(JoinedEpoch::unchanged(own));
@@ -251,6 +252,7 @@ fn join_into(
         store,
         step,
     };
+
     Ok(JoinedEpoch {
         labelled: Arc::new(tabulate(run, epoch, "stones-joined", labels)?),
         joined: report.joined,

@@ -198,6 +198,7 @@ fn write_field(path: &Path, field: &ChangeField) -> Result<()> {
     table.push("ny", "", "unit normal, world y", numbers(|p| p.normal.y))?;
     table.push("nz", "", "unit normal, world z", numbers(|p| p.normal.z))?;
     let meaning = "distance along the normal";
+
     table.push("distance_m", "m", meaning, options(|p| p.distance_m))?;
     let meaning = "95 % detection limit of the distance";
     table.push(
@@ -212,6 +213,7 @@ fn write_field(path: &Path, field: &ChangeField) -> Result<()> {
     table.push("spread_2_m", "m", meaning, options(|p| p.spread_m[1]))?;
     let meaning = "points in the cylinder, first epoch";
     table.push("count_1", "", meaning, counts(|p| p.counts[0]))?;
+
     let meaning = "points in the cylinder, later epoch";
     table.push("count_2", "", meaning, counts(|p| p.counts[1]))?;
     Ok(write_parquet(path, &table)?)
@@ -235,6 +237,7 @@ fn read_field(path: &Path) -> Result<ChangeField> {
         table.optional::<f64>("spread_1_m")?,
         table.optional::<f64>("spread_2_m")?,
     ];
+
     let counts = [
         table.required::<u32>("count_1")?,
         table.required::<u32>("count_2")?,
@@ -247,6 +250,7 @@ fn read_field(path: &Path) -> Result<ChangeField> {
         spread_m: [spread_m[0][i], spread_m[1][i]],
         counts: [counts[0][i], counts[1][i]],
     });
+
     Ok(ChangeField {
         points: points.collect(),
     })

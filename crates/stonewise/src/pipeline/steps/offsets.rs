@@ -133,6 +133,7 @@ fn places(first: &[Stone], second: &[Stone], matches: &[(StoneId, StoneId)]) -> 
     if pairs.len() < LEAST_STONES {
         return Vec::new();
     }
+
     let place = |(centre, normal, _): &(Point3<f64>, Vector3<f64>, Vector3<f64>)| {
         let mut near: Vec<(f64, Vector3<f64>)> = pairs
             .iter()
@@ -146,6 +147,7 @@ fn places(first: &[Stone], second: &[Stone], matches: &[(StoneId, StoneId)]) -> 
             normal: *normal,
         }
     };
+
     pairs
         .iter()
         .step_by(pairs.len().div_ceil(PLACES))
@@ -190,6 +192,7 @@ fn look(
             .grown(reach)
         })
         .collect();
+
     let tiles = &epoch.ingested.tiles;
     for tile in 0..tiles.tile_count() {
         progress.check()?;
@@ -220,6 +223,7 @@ fn look(
                 }
             });
     }
+
     Ok(views)
 }
 

@@ -143,6 +143,7 @@ fn followed(run: &Run, later: &[EpochId]) -> Result<Vec<TrackedStone>> {
         labelled.push(run.labelled(*id)?);
         known.push(run.matched(*id)?.pairs().iter().map(|p| p.1).collect());
     }
+
     let epochs: Vec<LaterStones> = { labelled.iter().zip(&known) }
         .map(|(l, known)| LaterStones {
             stones: &l.stones,
@@ -165,12 +166,14 @@ fn followed(run: &Run, later: &[EpochId]) -> Result<Vec<TrackedStone>> {
             missed: BTreeMap::new(),
         })
         .collect();
+
     for (k, id) in later.iter().enumerate() {
         let missing = places(&|t| t.first() < k && t.seen[k].is_none());
         for (i, is_shown) in missing.iter().zip(shown(&labelled[k], &found, &missing)?) {
             stones[*i].missed.insert(*id, is_shown);
         }
     }
+
     Ok(stones)
 }
 
@@ -211,6 +214,7 @@ fn measured(run: &Run, epochs: Pair<EpochId>, group: &[&TrackedStone]) -> Result
     }
     let labelled = Pair::new(run.labelled(epochs.first)?, run.labelled(epochs.later)?);
     let labelled = labelled.each_ref().map(|l| &**l);
+
     // Stones of the reference in both epochs, by their number in the first.
     let [first, later] = [
         run.matched(epochs.first)?.pairs(),
@@ -225,6 +229,7 @@ fn measured(run: &Run, epochs: Pair<EpochId>, group: &[&TrackedStone]) -> Result
     matches.extend(around.iter().map(|first| (*first, known[first].1)));
     matches.sort_unstable();
     let registered = run.registered_between(epochs, labelled, &matches)?;
+
     let known_datum = datum(run.context.project, epochs, &registered, &labelled.first.stones);
     let known_datum = known_datum.against(motion_in_common(labelled.first, &registered).as_ref());
     let outcomes = matches
@@ -240,6 +245,7 @@ fn measured(run: &Run, epochs: Pair<EpochId>, group: &[&TrackedStone]) -> Result
     let matched = Matched {
         report: Arc::new(report),
     };
+
     let facade = &run.outlined()?.facade;
     let rows = stone_rows(labelled, &matched, &registered, &known_datum, facade);
     let rows = rows.into_iter().filter_map(|row| {
@@ -257,9 +263,11 @@ fn measured(run: &Run, epochs: Pair<EpochId>, group: &[&TrackedStone]) -> Result
             ..row
         })
     });
+
     let places: BTreeMap<StoneId, Point3<f64>> =
         labelled.first.stones.iter().map(|s| (s.id, s.centroid)).collect();
     let (mut deformed, mut of_around) = (BTreeMap::new(), BTreeMap::new());
+
     for found in registered.deformation.iter().flat_map(|d| &d.stones) {
         let own = Deformed {
             place: places[&found.stone],
@@ -272,6 +280,7 @@ fn measured(run: &Run, epochs: Pair<EpochId>, group: &[&TrackedStone]) -> Result
             (None, None) => None,
         };
     }
+
     Ok(Some(TrackedPair {
         epochs,
         rows: rows.collect(),

@@ -59,6 +59,7 @@ pub(super) fn units_of(project: &Project, batch_points: u64) -> Result<Vec<Unit>
         .filter_map(|task| Some((task, task.step.cost?)))
         .collect();
     let mut list = List::default();
+
     for (number, (task, cost)) in (1..).zip(&with_unit) {
         let mut before = match number == with_unit.len() {
             true => list.units.iter().map(|unit| unit.id.clone()).collect(),
@@ -82,6 +83,7 @@ pub(super) fn units_of(project: &Project, batch_points: u64) -> Result<Vec<Unit>
         }
         list.push(task, None, whole, &before, cost(&sizes, task.epoch));
     }
+
     Ok(list.units)
 }
 
@@ -143,6 +145,7 @@ impl List {
                 .flatten()
                 .cloned(),
         );
+
         let ranks = needs.iter().filter_map(|id| self.ranks.get(id));
         let rank = ranks.max().map_or(0, |rank| rank + 1);
         self.before.insert(id.clone(), before);
@@ -165,6 +168,7 @@ impl List {
             done: false,
             id: id.clone(),
         });
+
         id
     }
 

@@ -45,6 +45,7 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
         path: file.clone(),
         message: message.to_owned(),
     };
+
     // Without a plan there is nothing to lock.
     Plan::read(out)?;
     let folder = OutputFolder::of_unit(out)?;
@@ -52,11 +53,13 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
     let Some(unit) = plan.units.iter().find(|u| u.id == id) else {
         return Err(stale(&format!("no unit {id:?} in this plan")));
     };
+
     if plan.program != code_version() {
         return Err(stale(
             "the plan was made by another build of stonewise: do its units with the same, or run `stonewise plan` again",
         ));
     }
+
     if plan.processor != processor_class() {
         return Err(stale(&format!(
             "the plan was made on a processor of the class \"{}\", and this one is \"{}\", where the last digits of results may differ: \
@@ -65,6 +68,7 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
             processor_class()
         )));
     }
+
     let project = Project::read(&plan.project)?.with_parameters(&plan.parameters)?;
     let digests = unchanged(&plan.inputs, &file)?;
     if Receipt::read(out, &plan.id, id).is_some() {
@@ -74,6 +78,7 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
             summary: None,
         });
     }
+
     refuse_too_early(out, &plan, unit)?;
     let clock = Clock::start();
     let scope = Scope {
@@ -94,11 +99,13 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
         }
         (summary, context.store.own_folders())
     };
+
     if summary.is_some() {
         // All other units are done, and what they left unfinished when they were killed is of no use.
         folder.sweep(&project);
         folder.finish_results(&project, true)?;
     }
+
     Receipt::write(out, &plan.id, id, &clock, folders)?;
     Ok(UnitDone {
         project,

@@ -45,6 +45,7 @@ pub(crate) fn most_likely_components(
         deviance(problem, &components).map_or(UNSOLVABLE, |d| d + components.penalty())
     };
     let mut log = clamp(problem.components.to_log());
+
     for _ in 0..STEPS {
         progress.check()?;
         let mut probes = vec![log];
@@ -67,6 +68,7 @@ pub(crate) fn most_likely_components(
         }
         log = candidates[best];
     }
+
     Ok(VarianceComponents::from_log(log, count))
 }
 
@@ -116,6 +118,7 @@ pub(crate) fn deviance(problem: &FieldProblem, components: &VarianceComponents) 
             )
         }
     };
+
     let normal = assemble(problem, prior, eliminated)?;
     let mut quadratic = 0.0;
     for ((state, stone), node) in normal
@@ -127,6 +130,7 @@ pub(crate) fn deviance(problem: &FieldProblem, components: &VarianceComponents) 
         quadratic += (stone_from_field(&node.face_from_world) * state).dot(&stone.vector);
         evidence += stone.log_evidence;
     }
+
     Some(normal.factor.log_det() - prior_log_det - quadratic - 2.0 * evidence)
 }
 

@@ -105,6 +105,7 @@ fn loosened(
     }
     let part = Subgraph::of(graph, within(REACH))?;
     let problem = part.restrict(&weighed);
+
     let likelihood = |stones: &[usize], least: &Least| {
         let mut problem = problem.clone();
         for place in stones.iter().filter_map(|i| part.place(*i)) {
@@ -112,9 +113,11 @@ fn loosened(
         }
         deviance(&problem, &problem.components)
     };
+
     let now = likelihood(&[], &Least::default())?;
     let zones = RADII.map(within);
     let mut tried = Vec::new();
+
     for stones in &zones {
         for (drift, strain) in DRIFTS.into_iter().flat_map(|d| STRAINS.map(|s| (d, s))) {
             let mut least = Least::default();
@@ -122,6 +125,7 @@ fn loosened(
             tried.push((stones, least));
         }
     }
+
     let found: Vec<Option<f64>> = tried
         .par_iter()
         .map(|(stones, least)| likelihood(stones, least))

@@ -50,6 +50,7 @@ fn test_jump(normal: &Normal, of_stone: &[(Matrix9, Vector9)], side: &[bool]) ->
     });
     let mut information = Matrix3::zeros();
     let mut vector = Vector3::zeros();
+
     for i in (0..side.len()).filter(|&i| side[i]) {
         let (m, v) = &of_stone[i];
         information += m.fixed_view::<3, 3>(0, 0);
@@ -60,6 +61,7 @@ fn test_jump(normal: &Normal, of_stone: &[(Matrix9, Vector9)], side: &[bool]) ->
             target -= known;
         }
     }
+
     let information = 0.5 * (information + information.transpose());
     match information.cholesky() {
         Some(factor) => {

@@ -55,6 +55,7 @@ pub(crate) fn posterior(equations: &NormalEquations, prediction: &Prediction, ow
     let mut covariance = Matrix9::zeros();
     let at_mean = equations.vector.dot(&mean) - 0.5 * mean.dot(&(equations.information * mean));
     let (mut log_evidence, mut misfit, mut freedom) = (equations.constant + at_mean, 0.0, 0);
+
     for k in 0..9 {
         let g = eigen.eigenvalues[k].max(0.0);
         let direction = eigen.eigenvectors.column(k).into_owned();
@@ -67,6 +68,7 @@ pub(crate) fn posterior(equations: &NormalEquations, prediction: &Prediction, ow
             freedom += 1;
         }
     }
+
     let explained = eigen.eigenvalues.iter().map(|g| g.max(0.0) / (1.0 + g.max(0.0)));
     Posterior {
         mean: (mean + root * step).into(),

@@ -114,6 +114,7 @@ pub(crate) fn tie_blocks(edge: &Edge, components: &VarianceComponents, is_parted
     let half = edge.step.map(|s| -0.5 * s);
     let low = [-1.0, half[0], half[1]];
     let high = [1.0, half[0], half[1]];
+
     let outer = |p: &[f64; 3], q: &[f64; 3], own: f64| {
         let mut block = Matrix9::zeros();
         for (a, pa) in p.iter().enumerate() {
@@ -127,6 +128,7 @@ pub(crate) fn tie_blocks(edge: &Edge, components: &VarianceComponents, is_parted
         }
         block
     };
+
     [
         outer(&low, &low, 1.0),
         outer(&high, &low, -1.0),

@@ -39,6 +39,7 @@ fn write_evidence(run: &Run) -> Result<()> {
         let media_type = logo_type(logo).map_err(Error::Survey)?;
         write_logo(out, logo, media_type)?;
     }
+
     let first = run.labelled(EpochId::REFERENCE)?;
     let windows = windows(&first.stones, &run.outlined()?.outlines);
     for epoch in context.project.epochs.ids() {
@@ -60,11 +61,13 @@ fn write_evidence(run: &Run) -> Result<()> {
         let points: Vec<_> = points.into_iter().map(|p| p.point).collect();
         write_thin_cloud(out, epoch.number(), &points)?;
     }
+
     for later in context.project.epochs.later_ids() {
         let labelled = run.labelled_pair(later)?;
         let labelled = labelled.each_ref().map(|l| &**l);
         let points = sections(context, labelled, &windows, &run.measured(later)?.rows)?;
         write_sections(out, later.number(), &points)?;
     }
+
     Ok(())
 }

@@ -36,6 +36,7 @@ pub fn sections(
     let wanted = (BUDGET / (4 * rows.len().max(1))).clamp(POINTS[0], POINTS[1]);
     let by_id: BTreeMap<u32, &Window> = windows.iter().map(|w| (w.stone_id, w)).collect();
     let mut points = Vec::new();
+
     for (later, epoch) in epochs.into_iter().enumerate() {
         let mut searches: BTreeMap<u32, Search> = BTreeMap::new();
         for row in rows {
@@ -52,6 +53,7 @@ pub fn sections(
         }
         gather(context, epoch, later == 1, &searches, &mut points)?;
     }
+
     let key = |p: &SectionPoint| (p.stone_id, p.is_later, p.cut == Cut::Upright);
     points.sort_by(|a, b| key(a).cmp(&key(b)).then(a.place_m.total_cmp(&b.place_m)));
     Ok(points

@@ -111,6 +111,7 @@ pub(super) fn stones_in_boxes(
             boxes.iter_mut().for_each(|b| b.add(&p, at, out_m));
         }
     }
+
     let faces: Vec<_> = boxes.iter().map(Boxed::face).collect();
     let mut by_photo: BTreeMap<usize, Vec<(usize, [f64; 4])>> = BTreeMap::new();
     for (i, (boxed, face)) in boxes.iter().zip(&faces).enumerate() {
@@ -123,10 +124,12 @@ pub(super) fn stones_in_boxes(
             by_photo.entry(photo).or_default().push((i, pixels));
         }
     }
+
     let segment = &context.project.settings.segment;
     let finder = StoneFinder::open(&Weights::named(&segment.model), segment.tiling.min_score as f32)?;
     let mut votes: Vec<Vec<u32>> = faces.iter().map(|face| vec![0; face.len()]).collect();
     let mut photos_of = vec![0u32; boxes.len()];
+
     for (photo, shown) in &by_photo {
         let image = read_rgb(&photos.photos[*photo].path)?;
         let pixels: Vec<[f64; 4]> = shown.iter().map(|s| s.1).collect();
@@ -144,6 +147,7 @@ pub(super) fn stones_in_boxes(
             }
         }
     }
+
     let outlined = |i: usize| {
         if photos_of[i] == 0 {
             return Err(NoEffect::NoPlace("no photo shows the whole box".to_owned()));
@@ -156,5 +160,6 @@ pub(super) fn stones_in_boxes(
         let ring = outline(&stone, &OutlineParams::default());
         ring.ok_or_else(|| NoEffect::NoPlace("the detector could not outline a stone in the box".to_owned()))
     };
+
     Ok((0..boxes.len()).map(outlined).collect())
 }

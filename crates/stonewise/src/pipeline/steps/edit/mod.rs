@@ -132,6 +132,7 @@ fn edit_epoch(
     let epoch = &context.project.epochs[id].name;
     let mut effects = vec![None; file.edits.len()];
     let mut asked: Vec<(usize, LabelEdit)> = Vec::new();
+
     for (index, (edit, places)) in file.edits.iter().zip(places).enumerate() {
         match places {
             _ if !edit.concerns(epoch) => {}
@@ -139,6 +140,7 @@ fn edit_epoch(
             Err(reason) => effects[index] = Some(Err(reason.clone())),
         }
     }
+
     let (indices, edits): (Vec<usize>, Vec<LabelEdit>) = asked.into_iter().unzip();
     let tiles = &labelled.ingested.tiles.surveyed;
     let key = Key::new("edit", &(&edits, wall), &[labelled.key.as_str()]);
@@ -164,6 +166,7 @@ fn edit_epoch(
         )?;
         write_json(&step.file(REPORT), &report)
     })?;
+
     let report: EditReport = read_json(&step.file(REPORT))?;
     for (&index, effect) in indices.iter().zip(&report.effects) {
         effects[index] = Some(effect.clone());
@@ -182,6 +185,7 @@ fn edit_epoch(
         store,
         step,
     };
+
     let number_of = |index: &usize| indices[*index] as u32 + 1;
     let edited = report.edited_by.iter();
     let edited = edited.map(|(stone, index)| (StoneId(*stone), number_of(index)));

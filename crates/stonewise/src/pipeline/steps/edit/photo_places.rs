@@ -44,6 +44,7 @@ pub(super) fn photo_places(
         .iter()
         .map(|edit| Ok(edit.shape().iter().copied().map(Point2::from).collect()))
         .collect();
+
     for (id, labelled) in labelled.with_ids() {
         let name = &context.project.epochs[id].name;
         let is_here = |edit: &Edit| edit.epoch.as_ref().map_or(id.is_reference(), |e| e == name);
@@ -85,6 +86,7 @@ pub(super) fn photo_places(
             places[index] = found;
         }
     }
+
     Ok(places)
 }
 
@@ -195,6 +197,7 @@ fn gather(context: &Context, rays: &mut [Ray], labelled: &Labelled) -> Result<()
         .map(|s| s.id.0)
         .collect();
     let tiles = &labelled.ingested.tiles.surveyed;
+
     for tile in 0..tiles.tile_count() {
         context.progress.check()?;
         let bounds = tiles.bounds(tile);
@@ -217,5 +220,6 @@ fn gather(context: &Context, rays: &mut [Ray], labelled: &Labelled) -> Result<()
             }
         }
     }
+
     Ok(())
 }

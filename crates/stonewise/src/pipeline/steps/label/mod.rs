@@ -239,6 +239,7 @@ pub(super) fn tabulate(run: &Run, epoch: EpochId, name: &str, labels: Labels) ->
         )?;
         write_json(&step.file("stones.json"), &stones)
     })?;
+
     let stones: Vec<Stone> = read_json(&step.file("stones.json"))?;
     if stones.is_empty() {
         let is_of_views = has_no_photos(context.project, epoch);
@@ -255,6 +256,7 @@ pub(super) fn tabulate(run: &Run, epoch: EpochId, name: &str, labels: Labels) ->
             "no stone of epoch {name:?} got any points: {why}"
         )));
     }
+
     Ok(Labelled {
         ingested,
         stones,

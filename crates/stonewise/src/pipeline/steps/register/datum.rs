@@ -50,14 +50,17 @@ fn of_errors(
         Datum::known(state, &errors.rigid.centre, &errors.rigid.covariance, note)
     };
     let shift_mm = |errors: &EpochErrors| 1e3 * errors.rigid.error.fixed_rows::<3>(0).norm();
+
     if let Some(errors) = errors.filter(|e| e.datum == observers::Datum::Stable) {
         let note = DATUM_STABLE.say(&[("error_mm", Said::numbers(format!("{:.2}", shift_mm(errors))))]);
         return known(DatumState::Stable, errors, note);
     }
+
     let centre = middle(stones);
     if project.is_aligned(epochs.later) {
         return Datum::unknown(&centre, &DATUM_ALIGNED);
     }
+
     if let Some(error_m) = project.settings.registration.epoch_error_m {
         // Both epochs carry the error of their registration.
         let variance = 2.0 * error_m * error_m;
@@ -65,15 +68,18 @@ fn of_errors(
         let note = DATUM_STATED.say(&[("error_mm", Said::numbers(format!("{:.1}", 1e3 * error_m)))]);
         return Datum::known(DatumState::Stated, &centre, &covariance, note);
     }
+
     if is_one_survey(project, epochs)
         && let Some(errors) = errors
     {
         return known(DatumState::Stated, errors, Said::from(&DATUM_ONE_SURVEY));
     }
+
     if let Some(errors) = errors.filter(|e| e.datum == observers::Datum::Sources) {
         let shared_mm = Said::numbers(format!("{:.1}", 1e3 * errors.shared_error_m));
         let note = DATUM_SOURCES.say(&[("error_mm", shared_mm)]);
         return known(DatumState::Sources, errors, note);
     }
+
     Datum::unknown(&centre, &REGISTRATION_UNKNOWN)
 }

@@ -32,12 +32,14 @@ pub(super) fn add_epoch_error(
     };
     registered.off_wall = off_wall.areas().to_vec();
     let sights = Sights::gather(project, epochs, labelled, matches, &off_wall, context.progress)?;
+
     for (id, count) in epochs.into_array().into_iter().zip(sights.too_many) {
         if let Some(count) = count {
             let message = TOO_MANY_SOURCES.say(&[("n", count.to_string().into())]);
             context.warnings.notice(STEP, &project.epochs[id].name, message);
         }
     }
+
     let neighbours = registered.neighbours_among(&sights.stones);
     let pair = EpochPair {
         sources: &sights.sources,
@@ -52,6 +54,7 @@ pub(super) fn add_epoch_error(
         }),
         is_aligned: project.is_aligned(epochs.later),
     };
+
     let observers = EpochErrorParams {
         shared_error_m: params.epoch_error_m.or(params.observers.shared_error_m),
         ..params.observers.clone()

@@ -132,6 +132,7 @@ fn register(
             write_json(&step.file(MOTIONS), &registered)
         },
     )?;
+
     Ok(Registered {
         folder: step.path().to_path_buf(),
         ..read_json(&step.file(MOTIONS))?

@@ -78,6 +78,7 @@ fn report_datum(context: &Context, later: EpochId, registered: &Registered) {
         .epoch_errors
         .as_ref()
         .is_some_and(|e| e.datum == observers::Datum::Stable);
+
     if let Some(errors) = &registered.epoch_errors {
         for &area in &errors.moved_areas {
             let message = STABLE_MOVED.say(&[("area", name_of(context, registered, area))]);
@@ -96,10 +97,12 @@ fn report_datum(context: &Context, later: EpochId, registered: &Registered) {
             context.warnings.notice(STEP, epoch, message);
         }
     }
+
     let values = [("cells", cells.to_string().into())];
     if named > 0 && !is_stable {
         context.warnings.skipped(STEP, epoch, STABLE_TOO_FEW.say(&values));
     }
+
     if named == 0 && context.project.settings.registration.auto_stable && !is_stable {
         context
             .warnings

@@ -73,6 +73,7 @@ impl OffWall {
                 .or_default()
                 .push(surface);
         }
+
         let mut found = Self::default();
         let mut neighbours = Vec::new();
         for heights in blocks.values() {
@@ -90,6 +91,7 @@ impl OffWall {
                 }
             }
         }
+
         neighbours.sort_unstable();
         for (cell, area) in neighbours {
             found.cells.entry(cell).or_insert(area);

@@ -92,10 +92,12 @@ impl DiskPairs {
             Vec::new()
         };
         let mut near = vec![[Vec::new(), Vec::new()]; self.batches[batch].len()];
+
         for record in bytes.chunks_exact(RECORD) {
             let (slot, epoch, point) = decode(record);
             near[slot][epoch].push(point);
         }
+
         let (mut slots, mut parts, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
         let mut windows = Vec::new();
         for (slot, ([one, two], pair)) in near.iter().zip(&self.batches[batch]).enumerate() {
@@ -112,6 +114,7 @@ impl DiskPairs {
                 offsets.extend(points);
             }
         }
+
         let mut table = Table::new();
         table.push("slot", "", "index of the pair of stones in its batch", slots)?;
         table.push(
@@ -120,6 +123,7 @@ impl DiskPairs {
             "0: first epoch, 1: second epoch, 2: second epoch, near the stone",
             parts,
         )?;
+
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             let values: Vec<f32> = offsets.iter().map(|o: &[f32; 3]| o[axis]).collect();
             table.push(
@@ -129,6 +133,7 @@ impl DiskPairs {
                 values,
             )?;
         }
+
         write_parquet(&self.file(batch), &table)?;
         Ok(windows)
     }

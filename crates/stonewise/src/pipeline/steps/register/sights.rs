@@ -60,6 +60,7 @@ impl Sights {
             let raw = labelled.ingested.tiles.surveyed.raw_sources()?;
             of_epoch.push(EpochSources::new(&raw, &epoch.clouds));
         }
+
         let mut sources: Vec<Source> = of_epoch
             .iter()
             .enumerate()
@@ -75,6 +76,7 @@ impl Sights {
         if is_one_survey(project, epochs) {
             share_errors(&mut sources);
         }
+
         let places = matched_stones(&labelled.first.stones, matches);
         let mut sights = Self {
             too_many: [0, 1].map(|e| of_epoch[e].too_many),
@@ -89,9 +91,11 @@ impl Sights {
             true => OffWall::default(),
             false => off_wall.thinned(MOST_OFFERED),
         };
+
         let most_stones = project.settings.registration.observers.contrasts.max_stones;
         let stride = places.len().div_ceil(most_stones.max(1)).max(1);
         let mut collected: Vec<BTreeMap<usize, Collected>> = vec![BTreeMap::new(); places.len()];
+
         for (e, epoch) in labelled.into_iter().enumerate() {
             let ids = places
                 .iter()
@@ -111,6 +115,7 @@ impl Sights {
             }
             pass.off_wall(&offered, &mut sights.offered)?;
         }
+
         sights.seen = places
             .iter()
             .zip(collected)

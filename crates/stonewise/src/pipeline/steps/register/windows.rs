@@ -95,6 +95,7 @@ fn align_group(
             points_second: b.points as usize,
         })
         .collect();
+
     Ok(align(&blocks[0], &blocks[1], &stones, params))
 }
 

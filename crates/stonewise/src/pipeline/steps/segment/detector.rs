@@ -73,6 +73,7 @@ impl<'a> Detection<'a> {
             .to_string(),
             Weights::File(path) => context.digest(path)?,
         };
+
         let ingested = match weights.takes_relief() {
             Ok(true) => Some(run.ingested(id)?),
             // An error is told where the detector is opened.
@@ -84,6 +85,7 @@ impl<'a> Detection<'a> {
         }
         digests.extend(ingested.as_ref().map(|i| i.step.key().as_str().to_owned()));
         let digests: Vec<&str> = digests.iter().map(String::as_str).collect();
+
         Ok(Self {
             context,
             epoch,
@@ -185,6 +187,7 @@ impl<'a> Detection<'a> {
             [image.width(), image.height()],
             [view.camera.width, view.camera.height],
         );
+
         if found != expected {
             progress.advance(self.tiles(view));
             let [[width, height], [camera_width, camera_height]] =
@@ -196,6 +199,7 @@ impl<'a> Detection<'a> {
                 ("camera_height", camera_height),
             ])));
         }
+
         let tiling = &self.context.project.settings.segment.tiling;
         let relief = match &self.ingested {
             Some(ingested) => {
@@ -209,6 +213,7 @@ impl<'a> Detection<'a> {
             drop_empty(&mut stones, &image);
         }
         write_label_png(&part.file(LABELS), &stones.labels)?;
+
         Ok(Outcome {
             instances: Some(instances(&stones)),
             reason: None,

@@ -46,6 +46,7 @@ pub fn write_labels(
             })
         })
         .collect::<Result<Vec<_>>>()?;
+
     let mut photos = Vec::new();
     for ((view, path), labelled) in candidates.into_iter().zip(read) {
         let Some(labelled) = labelled else { continue };
@@ -57,6 +58,7 @@ pub fn write_labels(
             instances,
         });
     }
+
     check_any(&photos, epoch, warnings)?;
     Ok(photos)
 }

@@ -154,12 +154,14 @@ impl PhotoModel {
             middle: nalgebra::center(&bounds.min, &bounds.max),
             extent_m: (0.5 * (bounds.max - bounds.min).norm()).max(1.0),
         };
+
         let of_used: Vec<f64> = used.iter().map(|&i| factors[i]).collect();
         let Some(poses) = problem.solve(bias_m, &of_used) else {
             return;
         };
         let mut found = vec![None; stones.len()];
         let mut shifts = vec![Vec::new(); stones.len()];
+
         for (k, (&i, stone)) in used.iter().zip(&problem.stones).enumerate() {
             let system = problem.system(stone, &poses.weights[k], &poses.scatter);
             found[i] = system
@@ -178,6 +180,7 @@ impl PhotoModel {
                 .and_then(|d| problem.shifts(stone, &poses.weights[k], &poses, &d))
                 .unwrap_or_default();
         }
+
         let photos = 0..self.centres.len();
         self.poses_px = photos.clone().map(|i| problem.pose_px(i, &poses)).collect();
         self.rows_px = photos
@@ -285,6 +288,7 @@ impl PhotoModel {
                 turn_sd_rad: found.and_then(turn_sd_rad).filter(|v| v.is_finite()),
             }
         };
+
         let tracks = 0..self.tracks.len();
         let poses = self.names.iter().cloned().zip(self.poses_px.iter().copied());
         PhotoReport {

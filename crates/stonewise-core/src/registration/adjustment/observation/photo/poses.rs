@@ -221,6 +221,7 @@ impl PoseProblem<'_> {
         let shift_m = self.pose_error_px * pixel_m;
         let mut pose = SMatrix::<f64, 2, PHOTO>::zeros();
         pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&(-to_face * shift_m));
+
         let turned = -to_face * (at - self.centres[sight.photo]).cross_matrix();
         pose.fixed_view_mut::<2, 3>(0, 3)
             .copy_from(&(turned * (shift_m / distance_m)));
@@ -235,15 +236,18 @@ impl PoseProblem<'_> {
         shared
             .fixed_view_mut::<2, 3>(0, 3)
             .copy_from(&(-to_face * arm.cross_matrix() * (second * reach)));
+
         shared
             .fixed_view_mut::<2, 1>(0, 6)
             .copy_from(&(to_face * arm * (second * reach)));
         let sign = SIGNS[self.epochs[sight.photo]];
+
         for (k, px) in [COMMON_PX, sign * scatter.rows_px[0]].into_iter().enumerate() {
             shared
                 .fixed_view_mut::<2, 2>(0, WHOLE + 2 * k)
                 .copy_from(&(sight.by_rows.shift * px));
         }
+
         (own, pose, shared)
     }
 
@@ -283,6 +287,7 @@ impl PoseProblem<'_> {
             poses_right: DVector::zeros(count),
             columns,
         };
+
         system.own[(2, 2)] = HEIGHT_M.powi(-2);
         for (k, (sight, w)) in sights.iter().zip(weights).enumerate() {
             let (own, pose, shared) = self.rows(stone, sight, scatter);
@@ -298,6 +303,7 @@ impl PoseProblem<'_> {
             system.poses += row.transpose() * weight * &row;
             system.poses_right += row.transpose() * (weight * sight.shift);
         }
+
         system
     }
 
@@ -315,6 +321,7 @@ impl PoseProblem<'_> {
             rows_px: START_ROWS_PX,
         };
         let mut found = None;
+
         for _ in 0..ROUNDS {
             let (corrections, covariance) =
                 self.solve_weighted(&weights, &trust, &scatter, bias_m, factors)?;
@@ -348,6 +355,7 @@ impl PoseProblem<'_> {
             });
             scatter.rows_px = rows_px;
         }
+
         found
     }
 
@@ -444,6 +452,7 @@ impl PoseProblem<'_> {
         let mut own = SMatrix::<f64, STONE, 1>::zeros();
         own.fixed_rows_mut::<3>(0).copy_from(&face);
         own.fixed_rows_mut::<3>(3).copy_from(displacement);
+
         let of_sight = |(sight, weight): (&Sight, &f64)| {
             let epoch = self.epochs[sight.photo];
             let moved = if epoch == 1 {
@@ -459,6 +468,7 @@ impl PoseProblem<'_> {
                 weight: *weight,
             })
         };
+
         Some(
             stone
                 .track

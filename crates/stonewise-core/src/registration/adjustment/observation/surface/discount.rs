@@ -67,6 +67,7 @@ fn with_log_det(mut equations: NormalEquations, factor: f64, error_m: f64) -> (N
         return (equations, 0.0);
     };
     let scaled = known / factor.max(1.0);
+
     let error = Matrix3::from_diagonal(&Vector3::new(error_m, error_m, 0.0));
     // (S^-1 + E)^-1 = S - S e (I + e S e)^-1 e S with E = e e, which holds for a singular S too.
     let Some(inner) = (Matrix3::identity() + error * scaled * error).try_inverse() else {
@@ -75,12 +76,14 @@ fn with_log_det(mut equations: NormalEquations, factor: f64, error_m: f64) -> (N
     let left = scaled - scaled * error * inner * error * scaled;
     let taken = known - 0.5 * (left + left.transpose());
     let pull_taken = taken * optimum;
+
     for r in 0..3 {
         equations.vector[INSIDE[r]] -= pull_taken[r];
         for c in 0..3 {
             equations.information[(INSIDE[r], INSIDE[c])] -= taken[(r, c)];
         }
     }
+
     equations.constant += 0.5 * pull_taken.dot(&optimum);
     (equations, -inner.determinant().ln())
 }

@@ -125,6 +125,7 @@ fn add_patch(
     let mut coupling = vec![[0.0; 9]; grid.coefficient_count()];
     let mut cells = PatchCells::new(&grid, layout.cell_m);
     let inverse = fit.factor.inverse();
+
     for (epoch, points) in epochs.iter().enumerate() {
         let sigma = noise.sigma_m[epoch];
         for o in points {
@@ -150,6 +151,7 @@ fn add_patch(
             sum.information.syger(w, &j, &j, 1.0);
         }
     }
+
     sum.deviance += fit.surface_deviance(noise) - epochs.iter().map(Vec::len).sum::<usize>() as f64;
     take_off_surface(&fit, coupling, &mut sum.information);
     cells.finish(noise, sum);

@@ -61,6 +61,7 @@ impl PatchFit {
         let [short, long] = basis.value;
         // Covariance of each coefficient with the height.
         let mut with_height = [[0.0; 4]; 4];
+
         for a in 0..4 {
             for b in 0..4 {
                 let column = basis.row(a) + b;
@@ -82,6 +83,7 @@ impl PatchFit {
                 }
             }
         }
+
         let (s, l) = (self.grid.short, 1 - self.grid.short);
         let mut out = [0.0; 2];
         for a in 0..4 {
@@ -89,6 +91,7 @@ impl PatchFit {
             out[s] += along(&basis.slope[0]) * long[a];
             out[l] += along(&short) * basis.slope[1][a];
         }
+
         out
     }
 

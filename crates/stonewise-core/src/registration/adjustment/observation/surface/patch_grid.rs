@@ -96,6 +96,7 @@ impl PatchGrid {
         let mut at = [0; 2];
         let mut value = [[0.0; 4]; 2];
         let mut slope = [[0.0; 4]; 2];
+
         for (k, axis) in [self.short, 1 - self.short].into_iter().enumerate() {
             let s = ((place[axis] - self.origin[axis]) / self.cell_m).clamp(0.0, self.cells[axis] as f64);
             let cell = (s as usize).min(self.cells[axis] - 1);
@@ -116,6 +117,7 @@ impl PatchGrid {
             .map(|d| d / self.cell_m);
             at[k] = cell;
         }
+
         let [stride, _] = self.counts();
         Basis {
             first: at[1] * stride + at[0],

@@ -61,6 +61,7 @@ pub(crate) fn pool_into_patches(
             roughness: pair.noise.roughness,
         })
         .collect();
+
     let mut compare = CellSums::new(cuts.low, cuts.high, COMPARE_CELLS * layout.cell_m);
     for (epoch, points) in epochs.into_iter().enumerate() {
         for p in points {
@@ -71,6 +72,7 @@ pub(crate) fn pool_into_patches(
             }
         }
     }
+
     list.retain(|patch| patch.epochs.iter().all(|o| o.len() >= PATCH_POINTS));
     Patches {
         list,

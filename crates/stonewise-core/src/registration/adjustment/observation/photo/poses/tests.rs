@@ -82,6 +82,7 @@ fn poses_and_displacements_are_those_of_dense_least_squares() {
         middle: Point3::new(0.0, 0.0, 1.0),
         extent_m: 2.0,
     };
+
     let weights: Vec<Vec<f64>> = vec![vec![1.0, 0.5, 1.0, 0.8, 1.0]; 9];
     let bias_m = 5e-4;
     let scatter = Scatter {
@@ -91,12 +92,14 @@ fn poses_and_displacements_are_those_of_dense_least_squares() {
     let (corrections, covariance) = problem
         .solve_weighted(&weights, &[1.0; 9], &scatter, bias_m, &[1.0; 9])
         .unwrap();
+
     // All unknowns side by side.
     let count = problem.unknowns();
     let all = count + STONE * 9;
     let mut normal = DMatrix::<f64>::zeros(all, all);
     let mut right = DVector::<f64>::zeros(all);
     (0..count).for_each(|k| normal[(k, k)] = 1.0);
+
     for (k, stone) in problem.stones.iter().enumerate() {
         let at = count + STONE * k;
         normal[(at + 2, at + 2)] += HEIGHT_M.powi(-2);
@@ -118,10 +121,12 @@ fn poses_and_displacements_are_those_of_dense_least_squares() {
             right += row.transpose() * (weight * sight.shift);
         }
     }
+
     let inverse = normal.clone().try_inverse().unwrap();
     let solution = &inverse * &right;
     assert!((&corrections - solution.rows(0, count)).norm() < 1e-7 * corrections.norm());
     assert!((&covariance - inverse.view((0, 0), (count, count))).norm() < 1e-6 * covariance.norm());
+
     // A stone's displacement with the poses as they are.
     let poses = Poses {
         corrections,
@@ -139,6 +144,7 @@ fn poses_and_displacements_are_those_of_dense_least_squares() {
         (joined - expected).norm() < 1e-6 * expected.norm(),
         "{joined} {expected}"
     );
+
     // Derivatives by differences: each unknown of the poses is changed by one.
     let other = problem.system(&problem.stones[5], &weights[5], &scatter);
     let changes = |system: &StoneSystem| -> DMatrix<f64> {
@@ -151,6 +157,7 @@ fn poses_and_displacements_are_those_of_dense_least_squares() {
         let columns = (0..count).map(|k| displacement(Some(k)) - displacement(None));
         DMatrix::from_fn(3, count, |r, k| columns.clone().nth(k).unwrap()[r])
     };
+
     let expected = changes(&system) * &poses.covariance * changes(&other).transpose();
     let (_, _, other) = other.displacement(&poses).unwrap();
     let found = by_poses.covariance_with(&other, &poses.covariance);
@@ -166,6 +173,7 @@ fn shifted_rows_do_not_move_stones() {
     let places: Vec<Point3<f64>> = (0..30)
         .map(|i| Point3::new(0.0, f64::from(i % 6) * 0.8 - 2.0, f64::from(i / 6) * 0.8 - 1.6))
         .collect();
+
     let photo = |i: u32| {
         let centre = Point3::new(6.0, f64::from(i % 3) - 1.0, 0.7 * f64::from(i / 3 % 2) - 0.35);
         let look = Rigid3::face_towards(&centre, &Point3::origin(), &Vector3::z()).inverse();
@@ -180,6 +188,7 @@ fn shifted_rows_do_not_move_stones() {
             }),
         }
     };
+
     let photos: Vec<Photo> = (0..12).map(photo).collect();
     let centres: Vec<Point3<f64>> = photos.iter().map(|p| p.camera.centre()).collect();
     let mut rng = ChaCha8Rng::seed_from_u64(9);
@@ -188,6 +197,7 @@ fn shifted_rows_do_not_move_stones() {
         .collect();
     let of_epochs = [Vector2::new(3.0, -2.0), Vector2::new(-3.0, 2.0)];
     let alike: Vec<Vector2<f64>> = photos.iter().map(|p| of_epochs[p.epoch]).collect();
+
     let worst_m = |shifts_px: &[Vector2<f64>], known: f64| {
         let sight = |photo: usize, at: &Point3<f64>| {
             let by_rows = photos[photo].by_rows(at, &turn).unwrap();
@@ -231,6 +241,7 @@ fn shifted_rows_do_not_move_stones() {
         let stones = problem.stones.iter().zip(&poses.weights);
         stones.map(moved).fold(0.0, f64::max)
     };
+
     // The last row is shifted by up to four pixels of 3 mm in each direction; no stone has moved.
     for shifts_px in [each, alike] {
         let [known, unknown] = [1.0, 0.0].map(|known| worst_m(&shifts_px, known));
