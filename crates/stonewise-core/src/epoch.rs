@@ -184,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_list_knows_its_reference_its_later_epochs_and_its_pairs() {
+    fn a_list_gives_its_reference_its_later_epochs_and_its_pairs() {
         let years = Epochs::from(vec![2023, 2024, 2026]);
         assert_eq!(*years.reference(), 2023);
         let later: Vec<(usize, i32)> = years.later_ids().map(|e| (e.number(), years[e])).collect();

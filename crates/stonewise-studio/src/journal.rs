@@ -164,7 +164,7 @@ impl Journal {
         edits: Vec<Edit>,
         facade: impl FnOnce() -> Result<Facade>,
     ) -> Result<bool> {
-        if self.knows(id) {
+        if self.contains(id) {
             return Ok(false);
         }
         // Edits without it were drawn on the wall of the run without edits, which results with edits keep.
@@ -187,7 +187,7 @@ impl Journal {
     /// # Errors
     /// As [`Self::add`].
     pub fn undo(&mut self, id: &str) -> Result<bool> {
-        let may = !self.knows(id) && self.can_undo();
+        let may = !self.contains(id) && self.can_undo();
         if may {
             self.act(Act::Undo { id: id.to_owned() })?;
         }
@@ -199,7 +199,7 @@ impl Journal {
     /// # Errors
     /// As [`Self::add`].
     pub fn redo(&mut self, id: &str) -> Result<bool> {
-        let may = !self.knows(id) && self.can_redo();
+        let may = !self.contains(id) && self.can_redo();
         if may {
             self.act(Act::Redo { id: id.to_owned() })?;
         }
@@ -226,7 +226,7 @@ impl Journal {
         !self.state.undone.is_empty()
     }
 
-    fn knows(&self, id: &str) -> bool {
+    fn contains(&self, id: &str) -> bool {
         self.state.ids.iter().any(|known| known == id)
     }
 

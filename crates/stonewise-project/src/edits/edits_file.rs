@@ -391,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn the_example_in_the_docs_is_read_and_the_schema_knows_every_edit() {
+    fn the_example_in_the_docs_is_read_and_the_schema_has_every_edit() {
         let docs = include_str!("../../../../docs/src/edits.md");
         let example = docs
             .split("```json\n")

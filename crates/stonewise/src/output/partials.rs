@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn it_knows_the_names_that_atomic_writing_gives() {
+    fn the_names_that_atomic_writing_gives_are_recognised() {
         let dir = tempfile::tempdir().unwrap();
         let _ = stonewise_io::atomic::write_atomically(&dir.path().join("a.laz"), |partial| {
             assert!(is_partial(&partial.file_name().unwrap().to_string_lossy()));
