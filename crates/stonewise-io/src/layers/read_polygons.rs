@@ -60,7 +60,7 @@ pub fn read_polygons(path: &Path, layer: &str) -> Result<Vec<PolygonFeature>, La
         let (fid, blob, attributes) = cells(row, &names, &column).map_err(sqlite)?;
         let Some(blob) = blob else { continue };
         let polygons = polygons(&blob)
-            .ok_or_else(|| content(format!("feature {fid} of {layer} is damaged, or is not a polygon")))?;
+            .ok_or_else(|| content(format!("feature {fid} of {layer} is damaged or not a polygon")))?;
         features.push(PolygonFeature {
             fid,
             polygons,
