@@ -117,7 +117,7 @@ fn same_day() -> PhotoParams {
     }
 }
 
-/// The same view in pixels of another size on the wall, metres.
+/// The parameters for the same view in pixels of this size on the wall, metres.
 fn with_pixel(photos: &PhotoParams, pixel_m: f64) -> PhotoParams {
     let factor = photos.distance_m / photos.focal_px / pixel_m;
     let size = |pixels: u32| (f64::from(pixels) * factor).round() as u32;

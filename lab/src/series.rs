@@ -121,7 +121,8 @@ struct Wall {
     terms: Vec<Term>,
     /// Stones that creep by more than half of the bulge, and those of them that are named.
     creeping: [usize; 2],
-    /// The same of stones that stepped.
+    /// Stones that stepped by more than half of the settlement, and those of them whose step is found in the right
+    /// epoch.
     stepped: [usize; 2],
     /// Of each later epoch, sums over the stones of deformation times true motion and of the latter squared.
     shown: Vec<[f64; 2]>,

@@ -44,7 +44,7 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
 /// Writes JSON for a later step, in one line.
 ///
 /// # Errors
-/// The value is none that JSON can hold; the file cannot be written.
+/// JSON cannot represent the value; the file cannot be written.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     write_text(path, &serde_json::to_string(value).map_err(no_json(path))?)
 }
@@ -52,7 +52,7 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
 /// Writes JSON that people read too.
 ///
 /// # Errors
-/// The value is none that JSON can hold; the file cannot be written.
+/// JSON cannot represent the value; the file cannot be written.
 pub fn write_readable_json(path: &Path, value: &impl Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value).map_err(no_json(path))?;
     write_text(path, &(text + "\n"))

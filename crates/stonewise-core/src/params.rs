@@ -62,7 +62,7 @@ impl ParamError {
         }
     }
 
-    /// The same error, of a parameter in this table.
+    /// Puts the name of the parameter's table before its key.
     #[must_use]
     pub fn within(mut self, table: &str) -> Self {
         self.key = format!("{table}.{}", self.key);

@@ -1,4 +1,4 @@
-//! How long work tells its caller where it stands, and how the caller stops it.
+//! How long work reports its progress to its caller, and how the caller stops it.
 
 /// The work was stopped by the caller before it was done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

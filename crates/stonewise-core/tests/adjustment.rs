@@ -661,7 +661,7 @@ fn a_stone_that_still_moves_has_no_motion() {
     assert_eq!(after(60), 0);
 }
 
-/// Stops after so many checks.
+/// Stops after this number of checks.
 struct Impatient(std::sync::atomic::AtomicUsize);
 
 impl Progress for Impatient {

@@ -47,7 +47,7 @@ impl PhotoName {
         }
     }
 
-    /// The same folders with another file.
+    /// The name of another file in the same folders.
     pub(crate) fn with_file(&self, file: String) -> Self {
         Self {
             folders: self.folders.clone(),

@@ -1,4 +1,4 @@
-//! The same small cloud in every format, written by other programs (see `testdata/clouds`).
+//! Reads one small cloud in every format, written by other programs (see `testdata/clouds`).
 
 #![allow(clippy::unwrap_used)] // a test may stop at the first surprise
 

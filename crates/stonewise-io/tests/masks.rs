@@ -24,7 +24,7 @@ fn coco_and_label_png_of_the_dam_are_the_same_pixels() {
     for photo in photos {
         let path = photo.unwrap().path();
         let (width, height) = image_size(&path).unwrap();
-        // The whole path, as the pipeline knows it.
+        // The whole path, as the pipeline passes it.
         let name = path.to_string_lossy();
         let a = coco.labels_for(&name, width, height).unwrap().unwrap();
         let b = png.labels_for(&name, width, height).unwrap().unwrap();

@@ -28,7 +28,7 @@ impl DatedCsv {
     /// Reads a file; `what` it is, after "reading".
     ///
     /// # Errors
-    /// With the line: no column `date`, two columns of one name, another number of cells, a date that is none.
+    /// With the line: no column `date`, two columns of one name, another number of cells, a date that is not valid.
     pub fn read(path: &Path, what: &'static str) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(Error::io(what, path))?;
         let mut file = Self {

@@ -65,7 +65,7 @@ pub enum ReadingGap {
     Before,
     /// An epoch lies after the last reading.
     After,
-    /// The readings before and after an epoch lie so many days apart.
+    /// The readings before and after an epoch lie this number of days apart.
     Apart(f64),
 }
 

@@ -257,7 +257,7 @@ impl Project {
         Self::parse_with(path, text, 2)
     }
 
-    /// The same for a project of this number of epochs at least.
+    /// The project that a file at `path` with this text would be, of `least_epochs` epochs at least.
     pub(crate) fn parse_with(path: &Path, text: &str, least_epochs: usize) -> Result<Self> {
         let source = Source { path, text };
         let raw: RawProject = toml::from_str(text).map_err(|e| source.not_toml(&e))?;

@@ -10,7 +10,7 @@ use stonewise_core::progress::Progress;
 use stonewise_io::atomic::write_atomically;
 use stonewise_results::ResultSet;
 
-/// A comment behind the end of the file, that tells a later call that it may replace the file.
+/// A comment behind the end of the file, by which a later call recognises that it may replace the file.
 const MARK: &str = "% made by stonewise report\n";
 
 /// A report as PDF: the browser that prints it, and the file that it may become.

@@ -3,7 +3,7 @@
 use super::{ResultSet, Sorted, Squares, StoneRow};
 use nalgebra::Point2;
 
-/// The same place in both methods.
+/// M3C2 distances and displacements, for comparison with the motions of the stones.
 pub struct Comparison {
     /// Median M3C2 distance on each stone, metres, in the order of [`ResultSet::stones`]; `None` without core
     /// points.

@@ -25,7 +25,7 @@ pub struct Joint {
     pub stones: [usize; 2],
     /// Its middle line in the unrolled facade, metres.
     pub line: [Point2<f64>; 2],
-    /// The same line in the world.
+    /// Its middle line in the world frame, metres.
     pub world: [Point3<f64>; 2],
     /// Unit vector across the joint in (along, up), from the first stone to the second.
     pub across: Vector2<f64>,

@@ -63,7 +63,7 @@ impl Sample {
         sample
     }
 
-    /// The same photo with what a cloud says about its surface; the map may have any resolution.
+    /// Sets the relief of the photo, which a point cloud shows; the map may have any resolution.
     #[must_use]
     pub fn with_relief(self, relief: Option<ReliefMap>) -> Self {
         Self { relief, ..self }

@@ -1,4 +1,4 @@
-//! The same weights and image give the same objects here and in torchvision (testdata/mask_rcnn).
+//! Objects that this crate and torchvision find with equal weights in an equal image (testdata/mask_rcnn).
 #![allow(clippy::unwrap_used)]
 
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};

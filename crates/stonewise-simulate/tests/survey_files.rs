@@ -102,7 +102,7 @@ fn a_survey_reads_back_and_is_the_same_for_the_same_parameters() {
         count("epoch2/cloud_uav.laz")
     );
 
-    // One of two photos is unaligned; the truth knows both.
+    // One of two photos is unaligned; the truth contains both.
     let delivered = read_cameras(&folder.path().join("epoch1/cameras_metashape.xml")).unwrap();
     let exact = read_cameras(&folder.path().join("truth/cameras_epoch1/colmap")).unwrap();
     assert_eq!((delivered.views.len(), exact.views.len()), (1, 2));

@@ -56,7 +56,7 @@ impl Mistake {
 /// The values of a project file.
 ///
 /// # Errors
-/// The text is no TOML.
+/// The text is not TOML.
 pub fn values(text: &str) -> Result<Json, Mistake> {
     let document = text
         .parse::<DocumentMut>()
@@ -67,7 +67,7 @@ pub fn values(text: &str) -> Result<Json, Mistake> {
 /// The text with a value set, or removed where it is `null`.
 ///
 /// # Errors
-/// The text is no TOML; the way leads through something that is no table; the value is none that TOML can hold.
+/// The text is not TOML; the way leads through something that is not a table; TOML cannot represent the value.
 pub fn with(text: &str, way: &[Step], value: &Json) -> Result<String, Mistake> {
     let mut document = text
         .parse::<DocumentMut>()
@@ -177,7 +177,7 @@ fn set_place(item: &mut Item, place: usize, rest: &[Step], value: &Json) -> Resu
     }
 }
 
-/// The same for a list that is written in one line.
+/// Sets, adds or removes an entry of a list that is written in one line.
 fn set_inline(list: &mut Array, place: usize, rest: &[Step], value: &Json) -> Result<(), String> {
     if !rest.is_empty() {
         let entry = list.get_mut(place).ok_or("no such entry")?;

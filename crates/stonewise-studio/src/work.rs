@@ -160,7 +160,7 @@ impl Run {
         drop(waited);
     }
 
-    /// The run tells of its steps.
+    /// Takes over a change of the run's steps.
     fn step(&self, change: impl FnOnce(&mut Steps)) {
         let mut inner = self.inner();
         change(&mut inner.steps);

@@ -54,7 +54,7 @@ pub struct PartShown {
     pub total: u64,
 }
 
-/// The steps of a run, as it tells of them.
+/// The steps of a run, as it reports them.
 #[derive(Clone, Debug, Default)]
 pub struct Steps {
     steps: Vec<StepShown>,
@@ -147,8 +147,8 @@ pub struct Told {
     pub part: PartShown,
 }
 
-/// What the run that works in a folder of results, or was interrupted there, told last, and how long ago; `None` where
-/// none tells anything.
+/// What the run that works in a folder of results, or was interrupted there, reported last, and how long ago; `None`
+/// where none reported anything.
 ///
 /// # Errors
 /// The file is damaged.
@@ -163,7 +163,7 @@ pub fn told(results: &Path) -> Result<Option<(Told, Duration)>> {
     Ok(Some((told, ago.unwrap_or_default())))
 }
 
-/// Passes on what a run tells, and writes it for those who watch from another program.
+/// Passes on what a run reports, and writes it for those who watch from another program.
 pub(crate) struct Watched<'a> {
     to: &'a dyn Progress,
     file: PathBuf,

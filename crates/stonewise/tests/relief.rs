@@ -61,7 +61,7 @@ fn blind(folder: &Path) -> PathBuf {
     path
 }
 
-/// The same weights after so many steps of training with relief.
+/// Trains the weights of [`blind`] with relief for this number of steps; returns the path of the model.
 fn model(folder: &Path, steps: u64) -> PathBuf {
     let out = folder.join(format!("model-{steps}"));
     fs::create_dir_all(&out).unwrap();

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use stonewise_simulate::{Target, World};
 
-/// One point in so many is looked at.
+/// One point in this many is looked at.
 pub const STEP: usize = 4;
 /// Half the side of the window that a buffer of 60 cm makes around a stone, metres.
 const WINDOW_M: f64 = 0.75;

@@ -56,7 +56,7 @@ pub struct Figures {
     pub measured: f64,
     pub in_plane: f64,
     pub out: f64,
-    /// The same with the best rigid motion of all errors removed: that is the datum's.
+    /// `in_plane` and `out` with the best rigid motion of all errors, which is the datum's, removed.
     pub no_datum_in: f64,
     pub no_datum_out: f64,
     pub beyond: f64,

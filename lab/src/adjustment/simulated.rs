@@ -211,7 +211,7 @@ fn split(scan: &Scan, seed: u64) -> (Places, Places) {
     halves
 }
 
-/// Every so many points of each stone where they truly lie on the unmoved wall. `share`: parts that the scan
+/// One in [`bound::STEP`] points of the stones where they truly lie on the unmoved wall. `share`: parts that the scan
 /// is cut into.
 fn exact(world: &World, scan: &Scan, epoch: usize, share: usize) -> bound::Exact {
     let origin = scan.cloud.origin();

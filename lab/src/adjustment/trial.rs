@@ -25,7 +25,7 @@ pub struct Truth {
 pub struct Trial {
     pub stones: [Places; 2],
     pub truth: BTreeMap<u32, Truth>,
-    /// Crack: a point on it and its direction across, world; which stones lie near it is asked of it.
+    /// Crack: a point on it and its direction across, world; it also gives which stones lie near it.
     pub crack: Option<Crack>,
     /// Standard deviations (in the face 2D, out of it) that no estimator without knowledge of other stones
     /// can beat, and the same for the rigid window of 1.5 m, per stone, metres.

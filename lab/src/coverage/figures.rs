@@ -16,7 +16,7 @@ pub struct Wall {
     pub datum: Option<Datum>,
     /// Stones whose interval holds the truth, along each axis and jointly.
     inside: [f64; 4],
-    /// The same without the rigid part of the errors, along each axis.
+    /// Stones whose interval holds the truth along each axis, the rigid part of the errors removed.
     inside_relative: [f64; 3],
     chi_square: f64,
     /// Squared errors before and after the datum's correction, and claims, mm^2, summed over axes.

@@ -1,4 +1,5 @@
-//! The same figures from scanned walls and the whole adjustment: slow, and a check of the small walls.
+//! Simulates the surveys of which coverage is measured with scanned walls and the whole adjustment: slow, and a check
+//! of the small walls.
 
 use super::errors::{Kind, Sensor};
 use super::small_wall::{Case, Survey};

@@ -19,7 +19,7 @@ pub enum Stable {
     Ground,
     /// Ground and a small building, whose faces across the wall a drone hardly sees.
     Building,
-    /// The same with an area that moved.
+    /// Ground, a small building, and an area that moved.
     Moved,
     /// Ground and one to three buildings of any size and direction, scanned with a beam of finite width.
     Buildings,
@@ -39,7 +39,8 @@ pub struct Survey {
     pub sigma_m: f64,
     /// Error of the later epoch against the reference at each stone: what a still stone seems to move.
     pub seeming: Vec<Vector3<f64>>,
-    /// The same with the noise that the adjustment leaves, and its covariances.
+    /// Error of the motion of each stone: `seeming` with the noise that the adjustment leaves; then the covariance of
+    /// that noise.
     pub measured: Vec<Vector3<f64>>,
     pub noise: Vec<Matrix3<f64>>,
 }

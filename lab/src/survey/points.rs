@@ -25,7 +25,7 @@ pub struct SurveyPoint {
 
 /// Points by stone; 0 holds what is no stone.
 pub type Points = BTreeMap<u32, Vec<SurveyPoint>>;
-/// The same without sources and times, world frame.
+/// Points by stone without sources and times, world frame, metres.
 pub type Places = BTreeMap<u32, Vec<Point3<f64>>>;
 
 /// The places of these stones.

@@ -31,7 +31,8 @@ impl ScannedWall {
         Self::later(params, count, 1)
     }
 
-    /// The same, the later epoch the one of this number, with the errors of that epoch: 1 for the second.
+    /// The wall whose later epoch is the one of this number, 1 for the second, with the errors of that epoch. `count`:
+    /// stations or strips of each epoch.
     pub fn later(params: &SceneParams, count: u32, epoch: usize) -> Self {
         let world = World::new(params);
         let epochs = [0, epoch].map(|e| {

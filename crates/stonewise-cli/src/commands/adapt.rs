@@ -9,7 +9,7 @@ use std::io::Write;
 use std::path::Path;
 use stonewise::{OutputFolder, Owner, Project};
 
-/// Where the detector goes that is not told otherwise, beside the project file.
+/// Default folder of the detector, beside the project file.
 const FOLDER: &str = "adapted";
 
 /// Trains a detector on what the survey confirms; the line for the project file goes to stdout.

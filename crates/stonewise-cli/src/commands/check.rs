@@ -32,8 +32,8 @@ pub fn check(args: &CheckArgs, force: bool, printer: &Printer) -> Result<Outcome
     })
 }
 
-/// Where the page goes: where it is told, else into a file of this call's own in the temporary folder, so that
-/// nothing is added to the survey. A file that is there must be an earlier page.
+/// Path of the page: that of the option, else a file of this call's own in the temporary folder, so that nothing is
+/// added to the survey. A file that is there must be an earlier page.
 fn page_path(args: &CheckArgs, force: bool) -> Result<PathBuf> {
     let temporary = || {
         let survey = args.project.file_stem().unwrap_or_default().to_string_lossy();

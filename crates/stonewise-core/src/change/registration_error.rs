@@ -7,9 +7,9 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 impl ChangeField {
-    /// The same distances, with limits for a registration error of each core point: LoD95 = t(nu) sqrt(s1^2 /
-    /// n1 + s2^2 / n2) + 1.96 reg. Student's quantile t takes the place of 1.96 because the spreads come from
-    /// few points; nu after Welch (1947).
+    /// Replaces the detection limits by those under a registration error of each core point: LoD95 = t(nu) sqrt(s1^2 /
+    /// n1 + s2^2 / n2) + 1.96 reg. Student's quantile t takes the place of 1.96 because the spreads come from few
+    /// points; nu after Welch (1947).
     ///
     /// `error_m`: standard deviation of the error along the normal, metres. Points without a limit stay
     /// without one. Source: Lague, Brodu & Leroux (2013), equation 1.

@@ -22,7 +22,8 @@ pub struct RotationScore {
     /// Whether the stated covariances are correct; `None` where the datum is unknown. `coverage_95.along` is
     /// the coverage of the rotation about the axis along the dam, and so on.
     pub calibration: Option<Calibration>,
-    /// The same relative to the common rigid motion, with covariances without the registration error.
+    /// Whether the covariances without the registration error are correct for rotations relative to the common rigid
+    /// motion.
     pub calibration_without_datum: Calibration,
 }
 

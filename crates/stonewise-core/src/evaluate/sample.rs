@@ -63,7 +63,7 @@ pub struct StoneOutcome {
     pub displacement: Option<Vector3<f64>>,
     /// Covariance of the displacement, m^2, registration error included where it is known.
     pub covariance: Option<Matrix3<f64>>,
-    /// The same without registration error of the epochs, m^2.
+    /// Covariance of the displacement without the registration error of the epochs, m^2.
     pub covariance_without_datum: Option<Matrix3<f64>>,
     /// Its rotation; `None` where there is no estimate.
     pub rotation: Option<RotationEstimate>,
@@ -85,7 +85,7 @@ pub struct RotationEstimate {
     pub rotation: Vector3<f64>,
     /// Its covariance, rad^2, registration error included where it is known.
     pub covariance: Matrix3<f64>,
-    /// The same without registration error of the epochs, rad^2.
+    /// Covariance of the rotation vector without the registration error of the epochs, world frame, rad^2.
     pub covariance_without_datum: Matrix3<f64>,
 }
 
@@ -102,7 +102,7 @@ pub struct MotionSample {
     pub place: Point3<f64>,
     /// Covariance of the estimate, world frame, m^2.
     pub covariance: Option<Matrix3<f64>>,
-    /// The same without registration error of the epochs, m^2.
+    /// Covariance of the estimate without the registration error of the epochs, world frame, m^2.
     pub covariance_without_datum: Option<Matrix3<f64>>,
     /// Whether claims are about absolute motions, not about motions against the common one.
     pub is_absolute: bool,
@@ -190,8 +190,8 @@ impl MotionSample {
         (common(|s| s.estimated), common(|s| s.truth))
     }
 
-    /// The same samples with the common rigid motion of estimates and of truths taken off, and with the
-    /// claims that hold without a datum; samples without such a claim are left out.
+    /// The samples less the common rigid motion of estimates and of truths, with the claims that hold without a datum;
+    /// samples without such a claim are left out.
     pub(super) fn without_datum(samples: &[Self]) -> Vec<Self> {
         let (estimated, truth) = Self::common_motions(samples);
         let at = |fitted: &Option<SmallMotion>, p: &Point3<f64>| {

@@ -39,8 +39,8 @@ impl Plane {
         Self::of_covariance(centroid, covariance, LEAST_WIDTH)
     }
 
-    /// The same plane from sums about `base`, which must lie among the points or near them: the square of its
-    /// distance costs digits.
+    /// The least-squares plane from sums about `base`, which must lie among the points or near them: digits are lost
+    /// with the square of its distance. `None` under three points or on a line.
     pub fn of_moments(base: &Point3<f64>, moments: &Moments) -> Option<Self> {
         if moments.count < 3.0 {
             return None;

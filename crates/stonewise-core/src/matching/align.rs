@@ -346,8 +346,8 @@ mod tests {
         stones.iter().enumerate().map(place).collect()
     }
 
-    /// The same wall in another frame, as another detector would show it: a share of the stones missing, centroids off
-    /// by some millimetres, areas by a tenth, normals by degrees.
+    /// The wall in another frame, as another detector would show it: a share of the stones missing, centroids off by
+    /// some millimetres, areas by a tenth, normals by degrees.
     fn seen(
         stones: &[Stone],
         rng: &mut ChaCha8Rng,

@@ -48,7 +48,7 @@ pub(super) struct Agreement {
 }
 
 impl Agreement {
-    /// The same stones among those that lie where both epochs have stones.
+    /// Number of the stones that are the same, as a share of those that lie where both epochs have stones.
     pub(super) fn share(&self) -> f64 {
         self.same.len() as f64 / self.covered.max(1) as f64
     }

@@ -10,7 +10,7 @@ use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// Overlap of two stones, 0..1, after the first is moved by the shift; `None` where it cannot be told, as by
+/// Overlap of two stones, 0..1, after the first is moved by the shift; `None` where it is unknown, as by
 /// [`footprint_overlap`](super::footprint_overlap).
 pub type Overlap<'a> = dyn Fn(&Stone, &Stone, &Vector3<f64>) -> Option<f64> + Sync + 'a;
 

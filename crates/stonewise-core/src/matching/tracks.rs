@@ -30,8 +30,8 @@ impl Track {
     }
 }
 
-/// Follows the stones that are none of the reference through the later epochs, given in the order of time, and keeps
-/// those that two epochs show.
+/// Follows the stones that the reference does not contain through the later epochs, given in the order of time, and
+/// keeps those that two epochs show.
 ///
 /// Each epoch is matched with the reference's stones and the followed ones together, so that the latter move with their
 /// neighbours. Numbers follow the largest of the reference. Cost: a match of stone tables for each epoch.

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 /// Share of false ones that is accepted among the stones that are named; of a wall on which nothing happened, the
 /// probability that one is named.
 pub(super) const LEVEL: f64 = 0.05;
-/// The same for trends and for steps, so that either of the two is claimed of a still wall with the probability above.
+/// Share of false ones among trends, and among steps, that is accepted: half of [`LEVEL`], so that one of the two is
+/// claimed of a still wall with the probability [`LEVEL`].
 pub(super) const CLAIM_LEVEL: f64 = LEVEL / 2.0;
 /// Half the width of a normal 95 % interval in standard deviations.
 const Z: f64 = 1.96;

@@ -102,7 +102,7 @@ pub(super) fn sd_of(variance: f64, factor: f64, freedom: f64) -> f64 {
     (variance * factor).sqrt() * widening
 }
 
-/// Probability of a value at least so many standard deviations from zero.
+/// Two-sided probability of a value at least this far from zero, in standard deviations.
 pub(super) fn p_value(value: f64, variance: f64, factor: f64, freedom: f64) -> f64 {
     let t = -(value / (variance * factor).sqrt()).abs();
     let tail = match freedom < NORMAL_FROM {

@@ -272,7 +272,7 @@ fn steps_for_trends(fitted: &mut [Fitted], model: &Model, factors: &[VarianceFac
             value: found.value,
             sd: found.sd,
         });
-        // Where trend and step cannot both be told, the trend alone says how well it is known.
+        // Where trend and step cannot both be estimated, the uncertainty of the trend is that of the trend alone.
         let left = both.map_or(trends[rival.stone], |fits| coefficient(&fits, factors, column));
         stone.instead = Some(Coefficient {
             value: Vector3::zeros(),

@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 pub struct Coefficient {
     /// Metres for each unit of the term.
     pub value: Vector3<f64>,
-    /// The same.
+    /// Standard deviations, metres for each unit of the term.
     pub sd: Vector3<f64>,
     /// Probability of so large a value by chance, in the least probable of the three components, times three.
     pub p: f64,

@@ -4,7 +4,7 @@ use super::basis::{Basis, SeriesEpoch, Term};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// Variance inflation beyond which a term cannot be told from others (Marquardt 1970).
+/// Variance inflation beyond which a term cannot be separated from others (Marquardt 1970).
 const LARGEST_INFLATION: f64 = 10.0;
 /// Observations that a model with conditions leaves over, at least.
 const LEAST_LEFT: usize = 2;
@@ -21,7 +21,7 @@ pub struct Inseparable {
     pub why: WhyInseparable,
 }
 
-/// Why a term cannot be told.
+/// Why a term cannot be separated from others.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "code", rename_all = "snake_case")]
 pub enum WhyInseparable {
@@ -76,7 +76,7 @@ impl Model {
         self.design.ncols()
     }
 
-    /// Whether each column is told from the others.
+    /// Whether each column can be separated from the others.
     fn is_determined(&self) -> bool {
         (1..self.unknowns()).all(|c| inflation(&self.design, c) < LARGEST_INFLATION)
     }

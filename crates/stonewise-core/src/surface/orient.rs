@@ -23,10 +23,11 @@ const LEAST_BATTER: f64 = 0.05;
 const LEVEL_ODDS: f64 = 2.2;
 const JOINTS_ODDS: f64 = 0.5;
 const BATTER_ODDS: f64 = 0.4;
-/// The same for a piece of an edge: where two parts meet, both are before the other or both behind.
+/// Natural logarithm of the odds that the evidence of a piece of an edge is right: where two parts meet, both are
+/// before the other or both behind.
 const EDGE_ODDS: f64 = 1.1;
-/// The same for a part that lies beside others and is parallel to them: all of them are seen from the same side,
-/// but in one of fifty cases.
+/// Natural logarithm of the odds that parallel parts that lie beside each other are seen from the same side, which
+/// holds in 49 of 50 cases.
 const BESIDE_ODDS: f64 = 3.9;
 /// Part of the cells of one that may lie before or behind the other.
 const OVERLAP: f64 = 0.25;
@@ -48,7 +49,7 @@ const INDEPENDENT_M2: f64 = 0.6;
 const LEDGE: f64 = 1.0 / 3.0;
 /// Part of the walls whose side may be less sure: railings, sides of buttresses, stray pieces.
 const UNSURE: f64 = 0.4;
-/// Edge of the cells that decide about signs, as a part of those that are asked for: edges and treads show in
+/// Edge of the cells that decide about signs, as a part of the edge of the cells returned: edges and treads show in
 /// small cells.
 const FINE: f64 = 0.6;
 /// Part of the surface that small cells must show; where noise is as wide as they are, they show less.

@@ -38,7 +38,7 @@ impl SplatDepth {
         }
     }
 
-    /// A map that nobody looks at.
+    /// An empty map, for where no depth is read.
     pub(super) fn none() -> Self {
         Self {
             map: DepthMap::filled(0, 0, f32::INFINITY),

@@ -7,7 +7,7 @@ pub struct TileLabels {
     pub stone: Vec<u32>,
     /// Share of the votes that the outcome (stone or background) got, 0..1; 0 where no photo voted.
     pub confidence: Vec<f32>,
-    /// Whether any photo voted: tells background (joints, building) from places that no photo sees.
+    /// Whether any photo voted: distinguishes background (joints, building) from places that no photo sees.
     pub seen: Vec<bool>,
 }
 

@@ -264,8 +264,8 @@ mod tests {
         0.008 * (split_mix((u64::from(k) << 16) + (i << 8) + j) as f64 / u64::MAX as f64)
     }
 
-    /// A wall of 10 x 10 stones of 20 cm in the plane x = 0, in which the middle 16 stand `back` by so much, and
-    /// the panels found in it.
+    /// A wall of 10 x 10 stones of 20 cm in the plane x = 0, in which the middle 16 stand `back` metres behind the
+    /// plane, and the panels found in it.
     fn found(back: f64, is_panel: bool) -> Vec<StoneId> {
         let is_middle = |k: u32| (3..7).contains(&(k % 10)) && (3..7).contains(&(k / 10));
         let stone = |k: u32| Stone {

@@ -101,7 +101,7 @@ impl Cell {
     }
 }
 
-/// The same cells; empty ones with enough neighbours take the stone that most of these have.
+/// Fills empty cells that have enough neighbours with the stone that most of these have.
 fn filled(cells: &Raster<Cell>) -> Raster<Cell> {
     let mut filled = cells.clone();
     let (width, height) = (cells.width(), cells.height());

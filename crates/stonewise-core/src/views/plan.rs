@@ -15,8 +15,8 @@ const LEAST_SHARE: f64 = 0.02;
 const MOST_DIRECTIONS: usize = 24;
 /// Cells of a target at least: half a square metre of a wall, with cells of a quarter of a metre.
 const LEAST_CELLS: usize = 8;
-/// Part of all walls that a target must hold, unless it holds so many cells: where a survey shows much, small
-/// pieces are things that stand before the wall.
+/// Part of all walls that a target must hold, unless it holds [`MANY_CELLS`]: where a survey shows much, small pieces
+/// are things that stand before the wall.
 const LEAST_PART: f64 = 0.1;
 const MANY_CELLS: usize = 48;
 /// Part of the rectangle around its cells that a target fills at least, unless it is small.

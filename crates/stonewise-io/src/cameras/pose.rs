@@ -3,10 +3,10 @@
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion};
 use stonewise_core::geometry::Rigid3;
 
-/// From the axes of a camera as OpenGL has them (y up, z against the view) to ours, and back.
+/// From the axes of a camera as OpenGL has them (y up, z against the view) to those of this crate, and back.
 pub const FLIP: Matrix3<f64> = Matrix3::new(1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0);
 
-/// The rotation that a matrix is; `None` where it is none to a thousandth.
+/// The rotation that a matrix represents; `None` where it is not a rotation to a thousandth.
 pub fn rotation(turn: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     let error = (turn.transpose() * turn - Matrix3::identity()).amax();
     let is_rotation = error <= 1e-3 && turn.determinant() > 0.0;

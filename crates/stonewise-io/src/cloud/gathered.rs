@@ -13,7 +13,7 @@ use super::spacing::Spacing;
 pub(super) const CHUNK_POINTS: usize = 100_000;
 /// Finest step of coordinates in text that is looked for, as a power of ten.
 const FINEST_DECIMALS: usize = 5;
-/// Coordinates in single precision are told from others by this many points at least.
+/// At least this many points are needed to distinguish coordinates in single precision from others.
 const FEW_POINTS: u64 = 10;
 
 /// The values of one field.
@@ -217,7 +217,7 @@ impl Steps {
     }
 }
 
-/// Whether a number is written with so many decimals, to the precision of its own.
+/// Whether a number has at most `decimals` decimal places, to the precision of a double.
 fn has_decimals(value: f64, decimals: usize) -> bool {
     let scaled = value * 10f64.powi(decimals as i32);
     (scaled - scaled.round()).abs() <= 4.0 * f64::EPSILON * scaled.abs().max(1.0)

@@ -142,7 +142,7 @@ fn nearest_m(sorted: &[Point3<f64>], of: usize) -> f64 {
     nearest
 }
 
-/// A number of a cell that tells nothing of its place (Steele et al. 2014, SplitMix).
+/// A hash of a cell, independent of its place (Steele et al. 2014, SplitMix).
 fn number_of(cell: &[i64; 3]) -> u64 {
     cell.iter().fold(0, |hash, &c| {
         let mut z = (hash ^ c.cast_unsigned()).wrapping_add(0x9e37_79b9_7f4a_7c15);

@@ -10,7 +10,7 @@ pub struct Crs {
     pub epsg: i32,
     /// Name.
     pub name: String,
-    /// Definition as WKT 1 or WKT 2; empty where only the code is known, and it is none of the common ones.
+    /// Definition as WKT 1 or WKT 2; empty where only the code is known, and it is not one of the common ones.
     pub wkt: String,
 }
 

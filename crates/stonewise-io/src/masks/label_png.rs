@@ -136,7 +136,7 @@ fn label_decoder(path: &Path) -> Result<LabelDecoder, MaskError> {
     Ok(decoder)
 }
 
-/// Decodes the pixels, unless the file cannot hold so many.
+/// Decodes the pixels, unless the file is too short for their number.
 fn decode_labels(decoder: LabelDecoder, path: &Path) -> Result<LabelImage, MaskError> {
     let (width, height) = decoder.dimensions();
     let length = std::fs::metadata(path)

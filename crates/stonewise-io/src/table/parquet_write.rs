@@ -22,7 +22,7 @@ const ROWS_PER_GROUP: usize = 1 << 20;
 
 /// Writes a table as a Parquet file, compressed with Snappy, with its metadata as key-value pairs.
 ///
-/// The same table gives the same bytes. A column of options is nullable; the others are required.
+/// Equal tables give equal bytes. A column of options is nullable; the others are required.
 ///
 /// # Errors
 /// The file cannot be written; an earlier file is kept then.

@@ -21,7 +21,7 @@ const WORDS: [&[&str]; 7] = [
 /// The time of an epoch whose files lie below a folder, seconds from 1970; `None` where they do not say it.
 type TimeOf = fn(&Path, &Found) -> Option<i64>;
 
-/// What tells the order where names do not, the surest first.
+/// Sources of the order where names do not give it, the surest first.
 const TIMES: [(TimeOf, &str); 2] = [
     (photo_time, "by the dates of their photos"),
     (
@@ -30,14 +30,14 @@ const TIMES: [(TimeOf, &str); 2] = [
     ),
 ];
 
-/// Photos of an epoch that are asked for their date.
+/// Photos of an epoch whose dates are read.
 const DATED_PHOTOS: usize = 5;
 /// Day on which GPS time began, counted from 1970.
 const GPS_DAY: f64 = 3657.0;
 const DAY_S: f64 = 86_400.0;
 
-/// Brings epochs in order of time as far as their names or their files tell it; says what told it. `root`: the folder
-/// that their paths are relative to.
+/// Sorts epochs by time as far as their names or their files give it; returns what gave it. `root`: the folder that
+/// their paths are relative to.
 pub(super) fn order(root: &Path, epochs: &mut [Found]) -> &'static str {
     let names: Vec<String> = epochs.iter().map(|e| e.name.to_lowercase()).collect();
     if names.iter().all(|n| n.bytes().any(|b| b.is_ascii_digit())) {

@@ -139,7 +139,7 @@ fn shared_limits(series: &[&[[f64; 2]]]) -> [[f64; 2]; 2] {
     ranges.map(|r| [(r[0] + r[1]) / 2.0 - half, (r[0] + r[1]) / 2.0 + half])
 }
 
-/// What all stones have in common, and what stands still; the latter cannot be told where a run is in doubt.
+/// What all stones have in common, and what stands still; the latter is unknown where a run is in doubt.
 pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
     let texts = facts.texts();
     let names = &texts.charts;

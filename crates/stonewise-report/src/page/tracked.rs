@@ -128,7 +128,7 @@ fn statuses(results: &ResultSet) -> BTreeMap<u32, PhotoStatus> {
     stones.map(|s| (s.stone_id, s.photos.status)).collect()
 }
 
-/// Number of a status in the page; 0 stands for a stone that the photos were not asked about.
+/// Number of a status in the page; 0 stands for a stone that was not tracked in the photos.
 fn status_number(status: PhotoStatus) -> u8 {
     match status {
         PhotoStatus::Tracked => 1,

@@ -173,7 +173,7 @@ mod tests {
         verdict_on(results, epochs, false, &Thresholds::default(), Language::English)
     }
 
-    /// Results whose stones all made one more rigid motion, which the record tells or does not.
+    /// Results whose stones all made one more rigid motion; `recorded`: whether the record contains it.
     fn swept(recorded: bool) -> EpochVerdict {
         let common = Vector6::new(0.01, -0.02, 0.005, 1e-4, 2e-4, -1e-4);
         let mut stones = rows();

@@ -15,7 +15,7 @@ struct Outlined<'a> {
     place: ZonePlace,
     /// Corners in the unrolled facade, counter-clockwise.
     facade: Vec<Point2<f64>>,
-    /// The same corners in the world.
+    /// Corners in the world frame, metres, in the order of `facade`.
     world: Vec<Point3<f64>>,
 }
 

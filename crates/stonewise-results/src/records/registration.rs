@@ -35,7 +35,8 @@ pub struct DeformationRecord {
     /// Bulge that is found in 95 of 100 cases, of a zone of 1, 3 and 10 m, metres; absent where the wall is
     /// smaller.
     pub detection_limits_m: [Option<f64>; 3],
-    /// The same of a zone that moves in the face, along it or up, whichever is seen worse.
+    /// Motion of a zone of 1, 3 and 10 m in the face that is found in 95 of 100 cases, along the wall or up, whichever
+    /// is found worse, metres; absent where the wall is smaller.
     #[serde(default)]
     pub limits_in_face_m: [Option<f64>; 3],
     /// The zones, the one of the largest deformation first.

@@ -149,8 +149,8 @@ impl EpochVerdict {
         self.datum.is_some_and(|d| d != DatumState::Unknown)
     }
 
-    /// Whether the results as a whole can be relied on; without, which stones moved or are loose cannot be
-    /// told, and the counts of such stones are only what was computed.
+    /// Whether the results as a whole can be relied on. If not, it is unknown which stones moved or are loose, and the
+    /// counts of such stones are only what was computed.
     pub fn is_sound(&self) -> bool {
         !self
             .reasons
@@ -321,7 +321,8 @@ pub struct DeformationVerdict {
     pub interval_mm: Option<[f64; 2]>,
     /// Bulge out of the wall that is found in 95 of 100 cases, of a zone of 1, 3 and 10 m; null where the wall is smaller.
     pub detection_limit_mm: [Option<f64>; 3],
-    /// The same of a zone that moves in the face, along it or up, whichever is seen worse.
+    /// Motion of a zone of 1, 3 and 10 m in the face that is found in 95 of 100 cases, along the wall or up, whichever
+    /// is found worse; null where the wall is smaller.
     #[serde(default)]
     pub detection_limit_in_face_mm: [Option<f64>; 3],
     /// The zones, the one of the largest deformation first.

@@ -37,7 +37,7 @@ impl SparseMatrix {
         &self.entries[self.range(row)]
     }
 
-    /// The same matrix with rows and columns exchanged; a row's entries come in rising order. O(entries).
+    /// The transposed matrix; the entries of a row are in ascending order of their columns. O(entries).
     pub fn transposed(&self) -> Self {
         let mut starts = vec![0usize; self.columns + 1];
         for &(column, _) in &self.entries {

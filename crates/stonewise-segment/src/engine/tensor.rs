@@ -81,7 +81,7 @@ impl Tensor {
         self.node.clone()
     }
 
-    /// The same values with other sides.
+    /// Changes the shape and keeps the values; the number of elements stays as it is.
     #[must_use]
     pub fn reshaped(self, shape: impl Into<Vec<usize>>) -> Self {
         let shape = shape.into();

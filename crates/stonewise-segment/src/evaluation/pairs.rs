@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use stonewise_core::raster::{LabelImage, Raster};
 
-/// Pairs of less overlap are none. From here on a mask fits one mask of the other image at most (two would
+/// Least intersection over union of a pair. From here on a mask fits one mask of the other image at most (two would
 /// have to share pixels), but for ties at exactly one half.
 const LEAST_IOU: f64 = 0.5;
 

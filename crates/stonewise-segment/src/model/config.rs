@@ -243,7 +243,7 @@ impl MaskRcnnConfig {
         }
     }
 
-    /// The same model with all channels of relief.
+    /// Adds all channels of relief to the model's input.
     #[must_use]
     pub fn with_relief(self) -> Self {
         Self {

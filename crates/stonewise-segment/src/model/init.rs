@@ -44,7 +44,7 @@ impl Init {
     }
 }
 
-/// The same value everywhere.
+/// A learnt parameter of this shape, of which all elements have this value.
 pub fn constant(shape: &[usize], value: f32) -> Param {
     learnt(Tensor::new(shape, vec![value; shape.iter().product()]))
 }

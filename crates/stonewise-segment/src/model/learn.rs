@@ -28,7 +28,8 @@ impl MaskRcnn {
         values(&self.computed_losses(samples, seed))
     }
 
-    /// The same, and the derivatives of their sum with regard to all parameters that are not fixed.
+    /// The losses of [`Self::losses`], and the derivatives of their sum with respect to all parameters that are not
+    /// fixed.
     pub fn gradients(&self, samples: &[Sample], seed: u64) -> (Losses, Gradients) {
         let tape = Tape::default();
         let mut model = self.clone();

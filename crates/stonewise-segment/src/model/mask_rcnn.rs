@@ -103,8 +103,8 @@ impl MaskRcnn {
         found
     }
 
-    /// The same model, faster: stored statistics are moved into the convolutions, and their weights are kept
-    /// in the form that is fastest in use. It can neither be trained nor saved under torchvision's names.
+    /// Prepares the model for fast inference: moves stored statistics into the convolutions, and keeps their weights in
+    /// the form that is fastest in use. The model can then neither be trained nor saved under torchvision's names.
     #[must_use]
     pub fn for_inference(mut self) -> Self {
         self.body.prepare();
@@ -114,7 +114,7 @@ impl MaskRcnn {
         self
     }
 
-    /// The same model without what scores less; this costs no time for masks then.
+    /// Leaves out stones that score less than `score`; no masks are computed for them.
     #[must_use]
     pub fn with_min_score(mut self, score: f32) -> Self {
         let threshold = &mut self.config.score_threshold;

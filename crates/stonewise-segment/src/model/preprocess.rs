@@ -64,8 +64,8 @@ pub fn batch(images: &[&RgbImage], seen: &[Seen], config: &MaskRcnnConfig) -> Te
     Tensor::new([images.len(), 3, height, width], values)
 }
 
-/// Relief [batch, channels, rows, columns] of a batch of images that has so many columns and rows, zeros
-/// where an image has none; `None` where no image has any.
+/// Relief [batch, channels, rows, columns] of a batch of images, with `width` columns and `height` rows; zeros where an
+/// image has none; `None` where no image has any.
 pub fn relief_batch(
     reliefs: &[Option<&ReliefMap>],
     seen: &[Seen],

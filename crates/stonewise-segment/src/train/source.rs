@@ -4,7 +4,7 @@ use crate::Sample;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::Scope;
 
-/// A supply of images without end, each told by its number.
+/// An endless supply of images, each identified by its number.
 pub trait SampleSource: Sync {
     /// The image of this number: the same at every call, so that a training that was interrupted
     /// goes on as if it had not been.

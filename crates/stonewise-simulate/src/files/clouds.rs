@@ -127,7 +127,7 @@ type Append<'a> = Box<dyn FnMut(&Scan) -> Result<(), SimulateError> + 'a>;
 
 fn append(cloud: &mut PointSink<'_>, known: &mut PointSink<'_>, scan: &Scan) -> Result<(), SimulateError> {
     let positions: Vec<Point3<f64>> = (0..scan.len()).map(|i| scan.cloud.world(i)).collect();
-    // LAS numbers 65,535 sources at most; no survey has so many stations.
+    // LAS numbers 65,535 sources at most; no survey has more stations.
     let sources: Vec<u16> = scan.source.iter().map(|s| *s as u16).collect();
     let observed = Observed {
         sources: &sources,

@@ -190,7 +190,7 @@ impl SurveyParams {
         }
     }
 
-    /// The same kind of survey with another wall, other surroundings, motions and noise.
+    /// Sets the seeds of the wall, of its surroundings, and of the motions and measurements.
     pub fn seeded(self, seed: u64) -> Self {
         Self {
             scene: self.scene.seeded(seed),

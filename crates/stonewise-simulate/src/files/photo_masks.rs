@@ -165,7 +165,7 @@ fn true_instances(labels: &LabelImage) -> Vec<InstanceInfo> {
         .collect()
 }
 
-/// The same masks, numbered from 1 in random order, and the pairs of old and new numbers.
+/// Numbers the masks from 1 in random order; returns them and the pairs of old and new numbers.
 fn shuffle(labels: &LabelImage, seed: u64) -> (LabelImage, Vec<(u32, u32)>) {
     let mut ids = present(labels);
     ids.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));

@@ -37,7 +37,7 @@ impl Default for SensorParams {
 
 /// Develops linear light into an 8-bit sRGB picture. `meter`: mean light that becomes middle grey.
 ///
-/// The same bytes for any number of threads: every row has random numbers of its own.
+/// The bytes are equal for any number of threads: every row has random numbers of its own.
 pub(super) fn develop(
     light: &Raster<[f32; 3]>,
     meter: f64,

@@ -38,7 +38,7 @@ impl Light {
         }
     }
 
-    /// The same day without sun, under a sky that is brighter for its clouds.
+    /// The light of the day without sun, under a sky that is brighter for its clouds.
     pub fn overcast(&self) -> Self {
         Self {
             sun_rgb: [0.0; 3],

@@ -137,9 +137,9 @@ impl<'a> Scene<'a> {
         self.trace_beam(from, along, [0.0; 2]).map(|(hit, _)| hit)
     }
 
-    /// The same, and from which distance on the other rays of a beam have to be looked at: before it they
-    /// meet nothing. The beam is `spread[0]` metres wide to either side where it starts, and `spread[1]` a
-    /// metre wider.
+    /// The first thing on the axis of a beam, and the distance, metres, from which on the other rays of the beam have
+    /// to be traced: before it they meet nothing. The beam is `spread[0]` metres wide to either side where it starts,
+    /// and `spread[1]` a metre wider.
     pub(super) fn trace_beam(
         &self,
         from: &Point3<f64>,
@@ -235,8 +235,7 @@ impl<'a> Scene<'a> {
         Some((point, self.target(&found)))
     }
 
-    /// Where one who comes down on the face at a place reaches the surface, and how far that is from the top
-    /// of the layer, metres.
+    /// Where the way down from the top of the layer on a place of the face reaches the surface, and its length, metres.
     fn come_down_at(&self, a: f64, u: f64) -> Option<(Point3<f64>, f64)> {
         let face = &self.wall.face;
         let top = FacePoint {

@@ -48,7 +48,7 @@ impl Default for SceneParams {
 }
 
 impl SceneParams {
-    /// The same kind of survey with another wall, other surroundings, motions and noise.
+    /// Sets the seeds of the wall, of its surroundings, and of the motions and measurements.
     pub fn seeded(mut self, seed: u64) -> Self {
         self.seed = seed;
         self.wall.seed = seed;
@@ -110,7 +110,8 @@ impl World {
         self.next_surface(part, &mut SampledFaces::default())
     }
 
-    /// The same, where parts that overlap are sampled one after the other.
+    /// Samples the surface of a part of the section, as [`World::surface`] does, where parts that overlap are sampled
+    /// one after the other: `sampled` holds the faces of the part before.
     pub fn next_surface(&self, part: [f64; 4], sampled: &mut SampledFaces) -> Surface {
         Surface::new(&self.wall, part, sampled)
     }

@@ -84,8 +84,8 @@ const STATION_S: f64 = 600.0;
 
 /// Scans a window of the section from all stations; `scene` holds the window's surroundings at least.
 ///
-/// The same points for any number of threads; times count from the start of the first station. Cost: about
-/// three microseconds a beam.
+/// The points are equal for any number of threads; times count from the start of the first station. Cost: about three
+/// microseconds a beam.
 pub fn scan_terrestrial(scene: &Scene, window: &Window, params: &TlsParams, seed: u64) -> Scan {
     let mut scan = Scan::empty(middle(scene));
     for station in stations(scene, params, seed) {

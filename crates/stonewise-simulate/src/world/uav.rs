@@ -75,8 +75,8 @@ impl UavParams {
 /// Scans a window of the section from all strips: fans across the flight line, one after the other. `scene`
 /// holds the window's surroundings at least.
 ///
-/// The same points for any number of threads; times count from the start of the first strip. Cost: about
-/// three microseconds a beam.
+/// The points are equal for any number of threads; times count from the start of the first strip. Cost: about three
+/// microseconds a beam.
 pub fn scan_airborne(scene: &Scene, window: &Window, params: &UavParams, seed: u64) -> Scan {
     let mut scan = Scan::empty(middle(scene));
     let step = params.spacing_m * f64::from(params.strips).sqrt();

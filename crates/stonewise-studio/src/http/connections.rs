@@ -1,4 +1,4 @@
-//! The open connections: so many, and no more.
+//! The open connections, limited in number.
 
 use std::collections::BTreeMap;
 use std::net::{Shutdown, TcpStream};

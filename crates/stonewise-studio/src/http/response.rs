@@ -74,7 +74,7 @@ impl Response {
         Self::new(status, "application/json", Body::Bytes(body.into()))
     }
 
-    /// The same page with an origin of its own, for pages that hold scripts themselves.
+    /// Gives the page an origin of its own, for pages that hold scripts themselves.
     #[must_use]
     pub fn sealed(self) -> Self {
         Self {
@@ -83,7 +83,7 @@ impl Response {
         }
     }
 
-    /// The same with a cookie.
+    /// Adds a cookie to the response.
     #[must_use]
     pub fn with_cookie(self, cookie: String) -> Self {
         Self {

@@ -97,7 +97,7 @@ mod tests {
     use super::*;
     use stonewise_segment::evaluation::FoundStone;
 
-    /// An image with ten stones of a part of the wall, of which so many are found, and one false stone.
+    /// An image with ten stones of a part of the wall, of which `right` are found, and one false stone.
     fn image(part: u32, right: u32) -> PhotoPairs {
         let stone = |label: u32, reference: Option<u32>| FoundStone {
             label,

@@ -22,7 +22,7 @@ const MARKER_FILE: &str = "marker.json";
 pub struct Owner {
     /// `project`, `survey`, `clouds`, ...
     kind: String,
-    /// What tells it from others of its kind: paths, or a digest of parameters.
+    /// What distinguishes it from others of its kind: paths, or a digest of parameters.
     identity: String,
     /// The owner in words.
     what: String,
@@ -74,13 +74,13 @@ struct Marker {
     relative: Option<PathBuf>,
 }
 
-/// What a folder tells of itself.
+/// To whom a folder belongs.
 pub(super) enum Found {
     /// Nothing is in it, or it does not exist.
     Empty,
-    /// The same owner's.
+    /// The folder belongs to the same owner.
     Ours,
-    /// Somebody else's; who, where that is known.
+    /// The folder belongs to another owner; which, where that is known.
     Other(Option<String>),
 }
 

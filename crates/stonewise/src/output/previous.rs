@@ -116,7 +116,7 @@ fn move_file(from: &Path, to: &Path) -> Result<()> {
     fs::rename(from, to).map_err(Error::io("moving a result of an earlier run aside", from))
 }
 
-/// Result files in a folder, relative to it. Files that others put there are none.
+/// Result files in a folder, relative to it. Files that others put there are not among them.
 ///
 /// # Errors
 /// The folder cannot be listed.
@@ -133,7 +133,7 @@ pub(super) fn results_in(folder: &Path, project: &Project) -> Result<Vec<PathBuf
     Ok(results)
 }
 
-/// The same without the labelled clouds, whose names only the project tells.
+/// Result files in a folder, relative to it, without the labelled clouds, whose names only the project gives.
 ///
 /// # Errors
 /// The folder cannot be listed.

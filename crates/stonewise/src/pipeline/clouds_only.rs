@@ -112,7 +112,7 @@ pub fn compare_clouds(
     Ok(context.warnings.sorted())
 }
 
-/// The outside of the first epoch's surface; tells what it follows from, and notes a doubt where that is weak.
+/// The outside of the first epoch's surface; reports what it follows from, and notes a doubt where that is weak.
 fn outside_of(context: &Context, first: &Ingested) -> Result<Outside> {
     let epoch = context.project.epochs.reference();
     let scanners = scanners(epoch)?;

@@ -27,7 +27,7 @@ impl Cost {
         }
     }
 
-    /// The same, reading these files.
+    /// Sets the files of the survey that the unit reads.
     pub fn reading(self, inputs: impl IntoIterator<Item = PathBuf>) -> Self {
         let inputs = inputs.into_iter().collect();
         Self { inputs, ..self }

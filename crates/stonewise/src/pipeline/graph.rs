@@ -85,7 +85,7 @@ impl Need {
         Self::of(step, Of::All)
     }
 
-    /// The same, for some epochs only.
+    /// Limits the need to the epochs for which `when` holds.
     pub const fn when(self, when: fn(&Project, EpochId) -> bool) -> Self {
         Self { when, ..self }
     }

@@ -202,7 +202,7 @@ fn photos_of(path: &Path) -> Result<(PathBuf, Vec<PathBuf>)> {
 /// The result of an earlier call for the same photo.
 fn taken_over(job: &FolderJob, step: &StepDir, photo: &Path, name: &Path) -> Result<Option<Segmentation>> {
     let (stamp, labels) = (file_in(step.path(), name, "json")?, label_path(job, name)?);
-    // A damaged note of what is done is none.
+    // A damaged note of what is done does not count.
     let Ok(done) = read_json::<Done>(&stamp) else {
         return Ok(None);
     };

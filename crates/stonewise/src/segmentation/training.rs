@@ -1,4 +1,4 @@
-//! A training that lasts so many minutes, in as many calls as it takes.
+//! A training of a given number of minutes, over as many calls as it takes.
 
 use crate::error::Result;
 use crate::files::create_results_folder;

@@ -133,7 +133,7 @@ impl StepDir {
         }
     }
 
-    /// Files without a stamp and without a record of a finished step are none of ours.
+    /// Refuses a folder whose files have neither a stamp nor the record of a finished step: another program made it.
     fn refuse_foreign(&self) -> Result<()> {
         if self.file(STAMP).exists() || self.record(DONE).is_some() || files_of(&self.path, &[])?.is_empty() {
             return Ok(());
@@ -149,7 +149,7 @@ impl StepDir {
         &self.key
     }
 
-    /// Removes every file and begins anew. The stamp goes last: a folder without one is none of ours.
+    /// Removes every file and begins anew. The stamp goes last: a folder without one is refused.
     fn empty(&self) -> Result<()> {
         let stamp = self.file(STAMP);
         if self.path.exists() {
@@ -237,8 +237,8 @@ impl StepDir {
     }
 }
 
-/// Removes the folder of a step, or of its parts, that nobody needs; it is gone at once or not at all. What no
-/// step made stays.
+/// Removes the folder of a step, or of its parts, that is not needed any more; it is gone at once or not at all. What
+/// no step made stays.
 pub(super) fn discard(path: &Path) -> Result<()> {
     let is_parts = path.extension().is_some_and(|e| e == "parts");
     let is_ours = is_parts || path.join(STAMP).exists() || path.join(DONE).exists();
@@ -299,10 +299,10 @@ fn digest_below(path: &Path, above: &mut Vec<PathBuf>) -> Result<String> {
 /// The file that this code was loaded from, where it is not the program itself.
 static LOADED_FROM: OnceLock<PathBuf> = OnceLock::new();
 
-/// Says which file this code was loaded from, before any work: a module of Python lies beside its
-/// interpreter, whose digest tells nothing about it.
+/// Sets the file that this code was loaded from, before any work: a module of Python lies beside its interpreter, whose
+/// digest does not identify it.
 pub fn set_program(file: PathBuf) {
-    // The first word counts; nobody says two.
+    // The first call counts; there is only one.
     let _ = LOADED_FROM.set(file);
 }
 

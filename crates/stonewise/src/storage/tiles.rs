@@ -71,7 +71,7 @@ impl DiskTiles {
         })
     }
 
-    /// The same tiles with every point moved by `frame`; their order, names and provenance stay.
+    /// These tiles with every point moved by `frame`; their order, names and provenance stay.
     pub fn in_frame(&self, frame: &Rigid3) -> Self {
         Self {
             dir: self.dir.clone(),

@@ -29,28 +29,28 @@ impl Tolerance {
         absolute: 3e-5,
         relative: 3e-2,
     };
-    /// The same for variances: the square of 0.03 mm, and a tenth.
+    /// Tolerance between machines for variances: the square of 0.03 mm, and a tenth.
     const VARIANCES: Self = Self {
         absolute: 1e-9,
         relative: 0.1,
     };
-    /// The same for what single photos show, which the adjustment averages.
+    /// Tolerance between machines for what single photos show, which the adjustment averages.
     const PHOTOS: Self = Self {
         absolute: 1e-4,
         relative: 0.1,
     };
 
-    /// The same for turns of stones that photos alone show: 0.1 mm on a stone of a few centimetres.
+    /// Tolerance between machines for turns of stones that photos alone show: 0.1 mm on a stone of a few centimetres.
     const TURNS: Self = Self {
         absolute: 3e-3,
         relative: 0.1,
     };
-    /// The same for probabilities, some of which are shares of 999 simulations.
+    /// Tolerance between machines for probabilities, some of which are shares of 999 simulations.
     const PROBABILITIES: Self = Self {
         absolute: 2e-2,
         relative: 3e-2,
     };
-    /// The same for lengths in millimetres and pixels.
+    /// Tolerance between machines for lengths in millimetres and pixels.
     const MILLIMETRES: Self = Self {
         absolute: 3e-2,
         relative: 3e-2,

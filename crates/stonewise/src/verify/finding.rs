@@ -38,7 +38,7 @@ pub struct Finding {
     pub subject: String,
     /// What came out.
     pub answer: Answer,
-    /// The same in words.
+    /// What came out, in words.
     pub message: String,
 }
 

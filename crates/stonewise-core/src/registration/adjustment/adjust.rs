@@ -66,8 +66,9 @@ pub fn adjust<S: PairSource>(
     adjust_with_photos(source, None, params, progress)
 }
 
-/// The same with photos, where there are any: once the clouds have brought the stones about where they are,
-/// each is tracked from photo to photo, and what the photos show joins what the points show.
+/// Estimates the motions as [`adjust`] does, from photos too where there are any: once the clouds have brought the
+/// stones about where they are, each is tracked from photo to photo, and what the photos show joins what the points
+/// show.
 ///
 /// # Errors
 /// As [`adjust`], and where parts of photos cannot be read.

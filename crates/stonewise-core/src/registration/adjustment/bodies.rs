@@ -162,8 +162,7 @@ fn translation_covariance(motion: &StoneMotion) -> Matrix3<f64> {
     motion.covariance.fixed_view::<3, 3>(0, 0).into_owned()
 }
 
-/// Whether a sum of squares of so many standard normal variables exceeds `square` with less than this
-/// probability.
+/// Whether the sum of squares of `freedom` standard normal variables exceeds `square` with less than this probability.
 fn is_improbable(square: f64, freedom: usize, probability: f64) -> bool {
     ChiSquared::new(freedom as f64).is_ok_and(|law| law.sf(square) < probability)
 }

@@ -33,7 +33,7 @@ pub(super) fn covered(adjustment: &Adjustment) -> Vec<bool> {
 }
 
 /// Refuses all stones of a part of the wall of which half or more are covered, and counts none of these as a part that
-/// moved: a crack around what covers them is none.
+/// moved: a crack around what covers them is no crack of the wall.
 pub(super) fn leave_out_covered(covered: &[bool], results: &mut [PairResult]) {
     let mut parts: BTreeMap<u32, [usize; 2]> = BTreeMap::new();
     for (result, covered) in results.iter().zip(covered) {

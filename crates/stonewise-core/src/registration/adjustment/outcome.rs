@@ -28,8 +28,8 @@ const BAD_CELL: f64 = 9.0;
 const BAD_SHARE: f64 = 0.25;
 /// At least this many cells: one alone may be that of a neighbour which did not move along.
 const BAD_CELLS: usize = 2;
-/// The same share where the stone is probably loose: at its own optimum, remaining disagreement means a wrong
-/// mask.
+/// The share in place of [`BAD_SHARE`] where the stone is probably loose: at its own optimum, remaining disagreement
+/// means a wrong mask.
 const BAD_SHARE_LOOSE: f64 = 0.2;
 /// Distance within the face that the joints around a stone leave it at most, metres: half a course of small bricks.
 const ROOM_M: f64 = 0.04;

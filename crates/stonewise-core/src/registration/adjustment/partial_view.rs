@@ -25,7 +25,7 @@ pub(super) fn estimated_rate(stones: impl Iterator<Item = (f64, f64)>) -> f64 {
     (STONES_EXPECTED * EXPECTED + wrong) / (STONES_EXPECTED + hidden)
 }
 
-/// The same before any stone counts.
+/// The rate of [`estimated_rate`] before any stone counts.
 pub(super) fn expected_rate() -> f64 {
     estimated_rate(std::iter::empty())
 }
@@ -39,8 +39,8 @@ pub(super) fn hidden(shared: &[f64]) -> Vec<f64> {
     shared.iter().map(|s| (1.0 - s / usual).max(0.0)).collect()
 }
 
-/// How much less of a stone its points show than so many across it would that its rims are clear, as a share;
-/// `counts`: in each epoch.
+/// By how much the points across a stone fall short of the number from which on its rims are clear, as a share;
+/// `counts`: points in each epoch.
 pub(super) fn missing(counts: [usize; 2]) -> f64 {
     let across = counts.map(|n| (n as f64).sqrt());
     ((CLEAR - across[0].min(across[1])) / (CLEAR - LEAST)).clamp(0.0, 1.0)

@@ -62,8 +62,8 @@ impl Adjustment {
         equations
     }
 
-    /// The problem whose likelihood tells of the variance components; `equations` as
-    /// [without error](Self::without_error).
+    /// The problem whose likelihood determines the variance components; `equations`: as [`Self::without_error`] gives
+    /// them.
     pub fn likelihood<'a>(&'a self, equations: &'a [NormalEquations]) -> FieldProblem<'a> {
         let mut problem = self.problem(equations.iter());
         problem.photos = self.photos.as_ref().map(|photos| PhotoTerms {

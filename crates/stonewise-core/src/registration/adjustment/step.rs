@@ -9,8 +9,8 @@ use super::stone_vector::StoneVector;
 
 /// One stone in this many may still swing between two optima of its own when the adjustment has settled.
 const RESTLESS: usize = 50;
-/// A stone's own optimum is followed once its points make it so many times more probably loose than it was
-/// without them.
+/// A stone's own optimum is followed once its points make it this many times more probably loose than it was without
+/// them.
 const SUSPECT: f64 = 1.5;
 /// A stone whose last step exceeds this many standard deviations of its motion swings between two optima:
 /// neither is its motion.
@@ -20,8 +20,7 @@ const SETTLED: f64 = 0.01;
 /// Where no iteration is left, a stone whose last step stayed within this share of its standard deviation has
 /// a motion: what is missing does not change its interval.
 const NEARLY_SETTLED: f64 = 0.1;
-/// Where no iteration is left, the wall has converged if at most one stone in so many has not: those have no
-/// motion.
+/// Where no iteration is left, the wall has converged if at most one stone in this many has not: those have no motion.
 const UNSETTLED: usize = 10;
 
 impl Adjustment {

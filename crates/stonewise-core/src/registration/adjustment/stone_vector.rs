@@ -49,7 +49,7 @@ impl StoneVector {
         &self.0
     }
 
-    /// The same direction, `factor` times as far.
+    /// All nine unknowns times `factor`.
     pub fn scaled(&self, factor: f64) -> Self {
         Self(self.0 * factor)
     }

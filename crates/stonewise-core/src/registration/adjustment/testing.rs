@@ -29,7 +29,7 @@ pub(in crate::registration) fn wall(
     wall_apart(rows, noise_m, |_| Vector3::zeros(), motion)
 }
 
-/// The same with stones that stand `apart` from their place in the wall, world, metres.
+/// The stones of [`wall`], each moved by `apart` from its place in the wall, world, metres.
 pub(super) fn wall_apart(
     rows: u32,
     noise_m: [f64; 2],

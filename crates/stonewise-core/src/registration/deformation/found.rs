@@ -22,7 +22,8 @@ pub struct Deformation {
     /// Smallest bulge out of the wall that is found in 95 of 100 cases, in the median over the wall, for each of
     /// [`ZONE_EXTENTS_M`]; `None` where the wall is smaller. Metres.
     pub detection_limits_m: [Option<f64>; 3],
-    /// The same of a zone that moves in the face, along it or up, whichever is seen worse.
+    /// Smallest motion of a zone in the face that is found in 95 of 100 cases, along the wall or up, whichever is found
+    /// worse, in the median over the wall, for each of [`ZONE_EXTENTS_M`]; `None` where the wall is smaller. Metres.
     pub limits_in_face_m: [Option<f64>; 3],
     /// Connected zones that deformed, the one of the largest motion first; none unless `p` is at most 1 %.
     pub zones: Vec<DeformationZone>,

@@ -251,7 +251,7 @@ fn inverse_or_zero(covariance: &Matrix3<f64>) -> Matrix3<f64> {
     covariance.cholesky().map_or_else(Matrix3::zeros, |f| f.inverse())
 }
 
-/// Squared standardised length; zero where the covariance is none.
+/// Squared standardised length; zero where the covariance is not positive definite.
 fn chi_square(deformation: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
     covariance
         .cholesky()

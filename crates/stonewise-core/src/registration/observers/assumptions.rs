@@ -17,7 +17,8 @@ pub(super) struct Model {
     pub components: ObserverComponents,
     /// Covariance of the error of the later epoch against the reference as a whole, m^2.
     pub whole: Matrix3<f64>,
-    /// The same where it is left open, so that areas alone determine it, m^2.
+    /// Covariance of the error of the later epoch as a whole where it is left open, so that areas alone determine it,
+    /// m^2.
     pub open: Matrix3<f64>,
     /// Of a source on a plane of a stable area, metres.
     pub plane_m: f64,

@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 /// Probability at which something is left out that stood still, divided by the number of things tested: the
 /// first step of Benjamini & Hochberg (1995).
 const RATE: f64 = 0.01;
-/// A motion is told from the errors of the sources where it is larger than these; of how large they are at
+/// A motion is distinguished from the errors of the sources where it is larger than these; of how large they are at
 /// most, in units of what sources of the class differ by at least.
 const MOST: f64 = 5.0;
 /// A direction is seen where the motion along it is known to this, metres: the normals of a plane's cells scatter by a

@@ -20,7 +20,8 @@ pub struct CrossCheck {
     /// did not move; world, metres. Along directions that the surfaces do not show, it tends to zero, with a
     /// large uncertainty.
     pub error: Vector3<f64>,
-    /// The same error as found without the surfaces, metres.
+    /// Error of the later epoch minus that of the reference in the middle of the stones, found without these surfaces;
+    /// world, metres.
     pub found: Vector3<f64>,
     /// Covariance of `found`, m^2.
     pub covariance: Matrix3<f64>,

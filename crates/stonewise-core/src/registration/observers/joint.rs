@@ -15,7 +15,8 @@ pub struct JointErrors {
     pub(crate) own: Vec<Matrix3<f64>>,
     /// Expectation of the error of each stone's points where it is taken off the motions; else zero.
     pub(crate) mean: Vec<Vector3<f64>>,
-    /// The same of each stone's motion, which follows its neighbours.
+    /// Expectation of the error of each stone's motion, which follows its neighbours, where it is taken off the
+    /// motions; else zero.
     pub(crate) mean_of_motions: Vec<Vector3<f64>>,
 }
 

@@ -208,7 +208,7 @@ fn stable_points(errors: &[Vector3<f64>], noise_m: f64) -> Vec<StablePoints> {
     stable_area(0, &Vector3::zeros(), errors, noise_m)
 }
 
-/// The same as one of several areas, at another place.
+/// Three planes at right angles, as one of several stable areas, at `place`; each source is shifted as a whole.
 fn stable_area(
     area: usize,
     place: &Vector3<f64>,

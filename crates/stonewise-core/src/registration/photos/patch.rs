@@ -54,7 +54,7 @@ const BEFORE: usize = 1;
 const AFTER: usize = 2;
 
 impl Patch {
-    /// Of values row by row, each of so many columns.
+    /// A patch of values in row-major order, with `columns` columns.
     pub fn new(values: Vec<f32>, valid: Vec<bool>, columns: usize) -> Self {
         let surrounded_along = |k: usize| {
             let column = k % columns;

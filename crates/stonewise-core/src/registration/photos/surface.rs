@@ -74,7 +74,7 @@ impl Surface {
         Some(surface)
     }
 
-    /// A flat square face of `side` cells of 3 mm, of which a rim of so many cells is left out.
+    /// A flat square face of `side` cells of 3 mm, of which a rim of `rim` cells is left out.
     #[cfg(test)]
     pub fn flat(side: usize, rim: usize) -> Self {
         let inside = |k: usize| {

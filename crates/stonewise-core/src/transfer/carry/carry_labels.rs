@@ -51,7 +51,7 @@ pub enum NotCarried {
     /// Its points cover no area.
     #[error("its points cover no area")]
     NoShape,
-    /// Its face is too small to be told from other places.
+    /// Its face is too small to be distinguished from other places.
     #[error("its face has too few cells of 3 cm: {cells}, {needed} are needed")]
     Small {
         /// Its cells.

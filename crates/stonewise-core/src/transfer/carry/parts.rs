@@ -10,8 +10,8 @@ use crate::stone::Stone;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Least share of the points of a part that lie on the face of the whole: not all, because outlines differ from
-/// epoch to epoch, and so many that a neighbour that overlaps the face is no part.
+/// Least share of the points of a part that lie on the face of the whole: not all, because outlines differ from epoch
+/// to epoch, but enough that a neighbour that overlaps the face is no part.
 const LEAST_SHARE: f64 = 0.6;
 /// Parts whose mean heights above the whole differ by more than this, metres, are not one stone: one of them
 /// moved. Ten millimetres: two thirds of the typical motion of a loose stone, and more than masks and noise

@@ -206,7 +206,7 @@ fn a_face_of_a_few_cells_is_not_carried() {
     assert_eq!(target, labels);
 }
 
-/// A stone that photos show, with so many points.
+/// A stone with this number of points, shown by this number of photos.
 fn shown(id: u32, points: usize, photos: u32) -> Stone {
     Stone {
         id: StoneId(id),
@@ -219,7 +219,7 @@ fn shown(id: u32, points: usize, photos: u32) -> Stone {
     }
 }
 
-/// Joins stones 1 and 2, which another epoch shows as one: in so many photos, and in others not. Stone 1 lies
+/// Joins stones 1 and 2, which another epoch shows as one in `photos` photos and misses in `missed`. Stone 1 lies
 /// `step` in front of where it was; returns the parts of new stones and all labels.
 fn joined(step: f64, parts: [u32; 2], [photos, missed]: [u32; 2]) -> (JoinReport, Vec<u32>, Vec<u32>) {
     let (tiles, _, mut one) = epoch(Vector3::zeros(), |_| 0.0, |_| true);

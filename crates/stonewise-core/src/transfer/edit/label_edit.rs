@@ -7,20 +7,20 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LabelEdit {
-    /// The stones at these places are one.
+    /// Merges the stones at these places into one.
     Merge(Vec<Point2<f64>>),
-    /// Stones that lie inside this outline by more than half of their points are one.
+    /// Merges the stones of which more than half of the points lie inside this outline into one.
     MergeInside(Vec<Point2<f64>>),
-    /// Stones that this line crosses from border to border are two.
+    /// Splits each stone in two that this line crosses from border to border.
     Split(Vec<Point2<f64>>),
-    /// What lies inside this outline is a stone of its own, apart from the stone that it is a part of.
+    /// Makes what lies inside this outline a stone of its own, apart from the stone that it is a part of.
     CutOut(Vec<Point2<f64>>),
-    /// At these places there is no stone.
+    /// Deletes the stones at these places.
     Delete(Vec<Point2<f64>>),
-    /// Stones that lie inside this outline by more than half of their points are none.
+    /// Deletes the stones of which more than half of the points lie inside this outline.
     DeleteInside(Vec<Point2<f64>>),
-    /// What no stone has inside this outline is a stone.
+    /// Adds a stone: the points inside this outline that belong to no stone.
     Add(Vec<Point2<f64>>),
-    /// Inside this outline there are no stones; a stone that reaches into it ends at the outline.
+    /// Removes all stones from inside this outline; a stone that reaches into it ends at the outline.
     Ignore(Vec<Point2<f64>>),
 }

@@ -9,7 +9,7 @@ use crate::cloud::extra_bytes::existing;
 use crate::cloud::gathered::{CHUNK_POINTS, Clock, Created, Gathered, Head, Rounding};
 use crate::cloud::{CloudError, PointChunk, ReadSummary};
 
-/// Gathers all points and says what the header tells of them.
+/// Gathers all points and returns what the header says of them.
 pub fn details(path: &Path, gathered: &mut Gathered) -> Result<(ReadSummary, Head), CloudError> {
     let mut source = LasSource::open(path)?;
     let head = head(&source);

@@ -9,7 +9,8 @@ use stonewise_core::change::M3c2Params;
 use stonewise_results::{ResultSet, Squares, Status, StoneRow};
 use wall::Wall;
 
-/// A stone is well seen where so many photos and points show it and its points got this share of the votes.
+/// A stone is well seen where at least this number of photos and of points show it, and its points got at least this
+/// share of the votes.
 const WELL_SEEN_PHOTOS: u32 = 2;
 const WELL_SEEN_POINTS: u32 = 100;
 const WELL_SEEN_CONFIDENCE: f64 = 0.6;

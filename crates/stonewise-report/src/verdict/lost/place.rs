@@ -13,7 +13,7 @@ const GONE_M: f64 = 0.03;
 const POINT_SHARE: f64 = 0.5;
 /// One with less than this share only holds stray points, and sees nothing behind the stone's place either.
 const STRAY_SHARE: f64 = 0.1;
-/// Width of the border around a stone whose coverage tells a hole from a gap in the later clouds, metres.
+/// Width of the border around a stone whose coverage distinguishes a hole from a gap in the later clouds, metres.
 const AROUND_M: f64 = 0.15;
 /// Share of the core points on a stone behind which the later clouds show something: then they look through
 /// its place, and a gap does not explain the others.

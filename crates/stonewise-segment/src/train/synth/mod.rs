@@ -57,7 +57,7 @@ const CANVAS_SCALE: f32 = 1.5;
 /// A photo of masonry drawn from a seed, `width` x `height` pixels (at least 1), with the visible face of
 /// every stone.
 ///
-/// The same seed and size give the same bytes. Cost: 0.3 to 0.5 microseconds a pixel on one core.
+/// Equal seeds and sizes give equal bytes. Cost: 0.3 to 0.5 microseconds a pixel on one core.
 pub fn masonry_photo(seed: u64, width: u32, height: u32) -> Sample {
     surveyed_photo_by(None, seed, width, height)
 }

@@ -71,13 +71,13 @@ impl Field {
         }
     }
 
-    /// The same wavelength in all directions, in a random direction of the table.
+    /// A field whose coarsest features measure `wavelength` in all directions, in a random direction of the table.
     pub(super) fn isotropic(rng: &mut Rng, grain: Grain, wavelength: f32) -> Self {
         let angle = between(rng, 0.0, std::f32::consts::TAU);
         Self::new(rng, grain, [wavelength; 2], angle)
     }
 
-    /// The same, of a wavelength drawn between two.
+    /// An isotropic field of a wavelength drawn from `low` to `high`, uniformly in the logarithm.
     pub(super) fn sized(rng: &mut Rng, grain: Grain, low: f32, high: f32) -> Self {
         let wavelength = log_between(rng, low, high);
         Self::isotropic(rng, grain, wavelength)

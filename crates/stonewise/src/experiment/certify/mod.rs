@@ -21,13 +21,13 @@ use stonewise_core::progress::Progress;
 
 /// The certificate as JSON.
 const JSON: &str = "certificate.json";
-/// The same as a page.
+/// The certificate as an HTML page.
 const PAGE: &str = "certificate.html";
 
 /// Makes a certificate and writes it into `out` as JSON and HTML. An interrupted one goes on where it stopped.
 ///
 /// # Errors
-/// What stops a simulation or a run. A figure that is not within what is allowed is none.
+/// What stops a simulation or a run. A figure outside its allowed range is not an error.
 pub fn certify(options: &CertifyOptions, out: &Path, progress: &dyn Progress) -> Result<Certificate> {
     let store = Arc::new(StepStore::new(&out.join("work"), Keeps::Every)?);
     let mut figures = solver::figures();

@@ -134,8 +134,8 @@ fn point(
     }
 }
 
-/// The same variant on several walls: counts are added, squares and shares weighted by the stones that were
-/// measured.
+/// Points of each variant, pooled over several walls: counts are added, squares and shares weighted by the stones that
+/// were measured.
 fn pooled(walls: &[Vec<SensitivityPoint>]) -> Vec<SensitivityPoint> {
     let Some(first) = walls.first() else {
         return Vec::new();

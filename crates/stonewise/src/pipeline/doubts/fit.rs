@@ -1,4 +1,4 @@
-//! Whether photos find the stones where clouds and cameras put them: that tells a misfit of cameras and clouds
+//! Whether photos find the stones where clouds and cameras put them: that distinguishes a misfit of cameras and clouds
 //! from other causes of a doubt.
 
 use crate::pipeline::steps::register::Registered;

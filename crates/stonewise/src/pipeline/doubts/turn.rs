@@ -6,9 +6,9 @@ use nalgebra::Matrix3;
 use stonewise_core::geometry::{DisplacementSample, SmallMotion};
 use stonewise_core::statistics::median;
 
-/// The wall as a whole turned by so much that displacements are not linear in the rotation any more, as the
-/// adjustment and the common rigid motion take them: the term of second order, |w x (w x a)| / 2 for a rotation
-/// vector w and an arm a, exceeds the typical standard deviation of a stone.
+/// The doubt that the wall as a whole turned too far for displacements to be linear in the rotation, as the adjustment
+/// and the common rigid motion take them: the term of second order, |w x (w x a)| / 2 for a rotation vector w and an
+/// arm a, exceeds the typical standard deviation of a stone.
 pub(super) fn turned(rows: &[StoneRow]) -> Option<Said> {
     let measured = rows.iter().filter(|r| r.status == Status::Ok);
     let measured = measured.filter_map(|r| Some((r.centroid, r.motion.as_ref()?)));

@@ -16,7 +16,7 @@ use std::path::Path;
 use stonewise_core::epoch::EpochId;
 use stonewise_io::cloud::{Created, cloud_date};
 
-/// Writes `run.json`, once everything is known that it tells.
+/// Writes `run.json`, once all its contents are known.
 pub static RECORD: Step = Step {
     name: "record",
     needs: &[Need::same(&VERDICT)],

@@ -111,7 +111,7 @@ fn with_partners(
     confirmed.map(|(own, _)| own).collect()
 }
 
-/// The same epoch without some stones.
+/// Drops these stones from an epoch.
 fn without(
     run: &Run,
     epoch: EpochId,

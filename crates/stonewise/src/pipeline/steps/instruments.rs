@@ -25,7 +25,7 @@ const STEP: &str = "instruments";
 const STONES: usize = 3;
 /// Probability below which instruments and stones, or one of them, disagree.
 const LEVEL: f64 = 0.05;
-/// The same for all that are in use together, below which they are not used.
+/// Probability below which the instruments in use, tested together, are not used.
 const CONTRADICTED: f64 = 0.001;
 
 /// An instrument with the stones around it.

@@ -48,7 +48,7 @@ impl Matched {
 }
 
 impl Run<'_> {
-    /// The stones of the reference in a later epoch; panels of doors and the like are none.
+    /// The stones of the reference in a later epoch, without panels of doors and the like.
     ///
     /// # Errors
     /// There are none; the clouds lie apart.

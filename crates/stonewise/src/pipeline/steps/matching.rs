@@ -1,4 +1,4 @@
-//! The same stones in two epochs as they are labelled at a time: before and after they are corrected.
+//! Matches of the stones of two epochs, before and after their labels are corrected.
 
 use crate::error::Result;
 use crate::files::{read_json, write_json};

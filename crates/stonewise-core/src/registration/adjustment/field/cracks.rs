@@ -35,8 +35,8 @@ const SIDE_STONES: usize = 10;
 const TESTED: usize = 150;
 /// Probability of finding a line, anywhere, in a wall without one.
 const FALSE_ALARM: f64 = 1e-4;
-/// Smaller jumps are not told from how scans join, metres: stations of a terrestrial survey are registered to
-/// a millimetre.
+/// Smaller jumps cannot be distinguished from how scans join, metres: stations of a terrestrial survey are registered
+/// to a millimetre.
 const SMALLEST_M: f64 = 1.5e-3;
 /// Turns, in steps between directions, by which the best line is refined.
 const TURNS: [f64; 5] = [0.0, -0.33, 0.33, -0.66, 0.66];

@@ -12,7 +12,7 @@ pub(crate) struct Prediction {
 }
 
 impl Prediction {
-    /// The same of a stone that moved by so much more, in its frame.
+    /// The prediction for a stone that moved by `by_m` metres more, in its frame.
     pub fn moved(&self, by_m: &Vector3<f64>) -> Self {
         let mut moved = self.clone();
         let mut translation = moved.mean.fixed_rows_mut::<3>(0);

@@ -46,7 +46,7 @@ pub static LABEL: Step = Step {
     ..Step::PLAIN
 };
 
-/// Finds how a later epoch lies in the frame of the reference, where the project asks for it.
+/// Finds how a later epoch lies in the frame of the reference, where the project file says so.
 pub static ALIGN: Step = Step {
     name: "align",
     words: |_| "alignment of",

@@ -76,7 +76,7 @@ impl<'a> Detection<'a> {
 
         let ingested = match weights.takes_relief() {
             Ok(true) => Some(run.ingested(id)?),
-            // An error is told where the detector is opened.
+            // An error is reported where the detector is opened.
             Ok(false) | Err(_) => None,
         };
         let mut digests = vec![digest];

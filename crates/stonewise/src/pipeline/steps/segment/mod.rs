@@ -70,7 +70,7 @@ fn photo_bytes(sizes: &Sizes, epoch: EpochId) -> u64 {
 
 fn takes_relief(project: &Project, epoch: EpochId) -> bool {
     let weights = Weights::named(&project.settings.segment.model);
-    // An error is told where the detector is opened.
+    // An error is reported where the detector is opened.
     project.epochs[epoch].masks.is_none() && matches!(weights.takes_relief(), Ok(true))
 }
 

@@ -63,8 +63,8 @@ impl Equations {
 
 /// Weight of the points of an epoch that a cell needs: the mean of fewer is not yet normal.
 const CELL_POINTS: f64 = 3.0;
-/// The same, times the square of the slope: a cell of ten points with slopes of 1 %. Less shows no motion in
-/// the face.
+/// Sum of weight times squared slope of the points of an epoch that a cell needs at least: ten points with slopes of 1
+/// %. Less shows no motion in the face.
 const LEAST_SLOPE: f64 = 1e-3;
 
 /// Normal equations at `motion`, of the points in the stone's window where that moved by `window`. Cost:

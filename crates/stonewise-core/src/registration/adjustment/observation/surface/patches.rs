@@ -7,8 +7,7 @@ use super::local_pair::LocalPair;
 use super::patch_grid::{PatchGrid, WeightedPoint};
 use super::surface_noise::SurfaceNoise;
 
-/// Points in each epoch that a patch needs: twice the unknowns of a plane, for a fit whose outliers can be
-/// told.
+/// Points in each epoch that a patch needs: twice the unknowns of a plane, for a fit whose outliers can be detected.
 const PATCH_POINTS: usize = 12;
 /// Width by which a face is widened, in cells: points that noise moved beyond the first epoch's outline still
 /// count.
