@@ -67,7 +67,7 @@ def one_for_all(coco):
 
 
 def one_over_all(coco):
-    """The same beside the masks of the stones."""
+    """One mask over the whole wall in every photo, beside the masks of the stones."""
     stones = json.loads(json.dumps(coco["annotations"]))
     one_for_all(coco)
     for number, annotation in enumerate(coco["annotations"]):

@@ -10,14 +10,14 @@
 //! stations and errors of its own in each epoch; each later epoch is adjusted against the first with true labels.
 //!
 //! Columns: coverage of the 95 % intervals of velocities along, up and out; root mean square of their errors and
-//! standard deviations, mm a year, and of the errors of straight lines through the motions of pairs; the same of the mean
-//! of the creeping zone, by the model and by pairs; coverage of the coefficients of level and season in the three directions together,
-//! and the walls whose model has the terms; coverage of the differences from the epoch before (of deformations, all
-//! three components together); walls of which a trend, an anomaly, either of them, a newest epoch that is not as predicted
-//! or not as in the past is claimed; share of stones that creep by more than half of the bulge and are named; share of
-//! stones that stepped by more than half and are named with the right epoch; the share of the true motions that the
-//! deformations of each later epoch show; deformations within their 95 % ellipsoid, of stones that stood still and of
-//! those that moved.
+//! standard deviations, mm a year, and of the errors of straight lines through the motions of pairs; the same of the
+//! mean of the creeping zone, by the model and by pairs; coverage of the coefficients of level and season in the three
+//! directions together, and the walls whose model has the terms; coverage of the differences from the epoch before (of
+//! deformations, all three components together); walls of which a trend, an anomaly, either of them, a newest epoch
+//! that is not as predicted or not as in the past is claimed; share of stones that creep by more than half of the bulge
+//! and are named; share of stones that stepped by more than half and are named with the right epoch; the share of the
+//! true motions that the deformations of each later epoch show; deformations within their 95 % ellipsoid, of stones
+//! that stood still and of those that moved.
 
 use crate::Outcome;
 use crate::figures::{CHI2_3_95, chi_square, coverage, rms_of_axes};
@@ -106,13 +106,13 @@ type Shown = (SeriesPlace, Vector3<f64>, [Vec<Vector3<f64>>; 2]);
 
 /// What was found of a wall.
 struct Wall {
-    /// Of velocities, metres a year.
+    /// Errors of velocities, metres a year.
     velocities: Errors,
     /// Errors of the straight line through the motions of pairs, each by itself.
     by_pairs: Vec<Vector3<f64>>,
     /// Mean errors of the creeping zone, of both.
     zone: [Vec<Vector3<f64>>; 2],
-    /// Of what the level does, and what the season does; empty where the term did not enter.
+    /// Errors of what the level does, and of what the season does; empty where the term did not enter.
     level: Errors,
     season: Errors,
     /// Differences from the epoch before that lie within their 95 % ellipsoid, and all.
@@ -124,7 +124,7 @@ struct Wall {
     /// Stones that stepped by more than half of the settlement, and those of them whose step is found in the right
     /// epoch.
     stepped: [usize; 2],
-    /// Of each later epoch, sums over the stones of deformation times true motion and of the latter squared.
+    /// Sums of each later epoch over the stones: of deformation times true motion, and of the latter squared.
     shown: Vec<[f64; 2]>,
     /// Deformations within their 95 % ellipsoid, and all: of stones that moved by less than a tenth of a millimetre, and
     /// of the others.

@@ -24,7 +24,7 @@ def xyz(points: Any, what: str = "points") -> NDArray[np.float64]:
 
 
 def optional_xyz(points: Any, what: str) -> Optional[NDArray[np.float64]]:
-    """The same for what may be absent."""
+    """Positions as :func:`xyz` gives them; ``None`` for none."""
     return None if points is None else xyz(points, what)
 
 

@@ -98,7 +98,7 @@ class Pair:
 
     @functools.cached_property
     def joints_arrow(self) -> Optional[pa.Table]:
-        """The same as an Arrow table."""
+        """The joints between neighbouring stones as an Arrow table; ``None`` where the run wrote no layers."""
         return self._layer_table("joints")
 
     @property
@@ -109,7 +109,7 @@ class Pair:
 
     @functools.cached_property
     def matches_arrow(self) -> pa.Table:
-        """The same as an Arrow table."""
+        """What became of every stone of the first epoch when its partner was sought, as an Arrow table."""
         report = _read_json(self._file("matches", "json"))
         qualities = {q["first"]: q for q in report["qualities"]}
         rows = []
@@ -236,7 +236,7 @@ class Results(Pair):
 
     @functools.cached_property
     def series_arrow(self) -> pa.Table:
-        """The same as an Arrow table."""
+        """The rows of all later epochs as an Arrow table."""
         path = self.path / "series.parquet"
         if path.is_file():
             return _read_parquet(path)

@@ -95,7 +95,10 @@ def stone_motions(*, outputs: TrialOutputs, ground_truth: Iterable[Any], options
 
 
 def m3c2_motions(*, outputs: TrialOutputs, ground_truth: Iterable[Any], options: Mapping[str, Any], **_: Any) -> dict[str, Any]:
-    """The same of M3C2, which the run computes beside the stones: the distance of the nearest core point along its normal."""
+    """The motion by M3C2, which the run computes beside the stones: the distance of the core point nearest to each point, along its normal.
+
+    It has no covariance.
+    """
     with (Path(outputs.run_dir) / "m3c2.csv").open(newline="", encoding="utf-8") as file:
         names = ("x", "y", "z", "NormalX", "NormalY", "NormalZ", "m3c2_distance")
         rows = [[float(row[name] or "nan") for name in names] for row in csv.DictReader(file)]

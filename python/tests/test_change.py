@@ -72,7 +72,7 @@ def test_core_points_thinned_from_the_first_epoch():
 
 def test_points_of_other_libraries():
     class Epoch:
-        """As py4dgeo has it."""
+        """An epoch as py4dgeo has it."""
 
         def __init__(self, cloud):
             self.cloud = cloud

@@ -91,7 +91,7 @@ def cells_of(notebook, tmp_path, monkeypatch, **replaced):
 
 
 def true_motions(survey):
-    """Of every stone of a simulated survey, out of the wall along x, metres, and its place."""
+    """The motion of every stone of a simulated survey, out of the wall along x, metres, by its place (y, z)."""
     with open(survey / "truth" / "stones.csv", newline="") as file:
         return {(float(row["cy"]), float(row["cz"])): float(row["dx"]) for row in csv.DictReader(file)}
 

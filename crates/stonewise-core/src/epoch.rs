@@ -136,9 +136,9 @@ impl<'a, T> IntoIterator for &'a Epochs<T> {
 /// Values of the reference and of a later epoch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Pair<T> {
-    /// Of the reference.
+    /// Value of the reference.
     pub first: T,
-    /// Of the later epoch.
+    /// Value of the later epoch.
     pub later: T,
 }
 

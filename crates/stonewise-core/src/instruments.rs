@@ -58,7 +58,7 @@ pub struct Tested {
 /// Whether instruments and stones agree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Agreement {
-    /// Of each instrument.
+    /// The test of each instrument.
     pub instruments: Vec<Tested>,
     /// Probability of so large differences of all of them together; `None` where nothing is left over to test.
     pub p: Option<f64>,

@@ -61,7 +61,7 @@ const REJECTED: f64 = 11.34;
 const LEAST_PART: f64 = 0.25;
 const LOWER_QUARTILE: f64 = 1.2125;
 
-/// With how much of its weight something of this squared standardised length counts (Tukey's biweight).
+/// Share of its weight with which something of this squared standardised length counts (Tukey's biweight).
 pub(crate) fn biweight(square: f64) -> f64 {
     (1.0 - square / REJECTED).max(0.0).powi(2)
 }

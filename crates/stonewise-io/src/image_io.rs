@@ -44,8 +44,8 @@ pub enum ImageIoError {
     },
 }
 
-/// Reads a JPEG, PNG or TIFF as 8-bit RGB, 16-bit values rounded; the format is told from the content, not the
-/// name. Of several pages of a TIFF the first is read.
+/// Reads a JPEG, PNG or TIFF as 8-bit RGB, 16-bit values rounded; the content gives the format, not the name. Of
+/// several pages of a TIFF the first is read.
 ///
 /// # Errors
 /// The file is missing, truncated or in another format.

@@ -11,7 +11,7 @@ use stonewise_base::error::Result;
 pub struct ConditionsFile {
     /// Where it lies.
     pub path: PathBuf,
-    /// Of each column: day and value, ascending by day.
+    /// Readings of each column: day and value, ascending by day.
     columns: BTreeMap<String, Vec<(f64, f64)>>,
     /// Longest time between two readings that is interpolated, days.
     longest_gap_days: f64,

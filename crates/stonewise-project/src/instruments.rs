@@ -36,7 +36,7 @@ pub struct Instrument {
     pub name: String,
     /// Where it is, in the frame of the clouds.
     pub place: Point3<f64>,
-    /// Of each axis of the world, readings ascending by day.
+    /// Readings of each axis of the world, ascending by day.
     axes: [Vec<Reading>; 3],
 }
 

@@ -27,7 +27,7 @@ use stonewise_core::stone::{MatchOutcome, PairResult, Stone, common_motion};
 use stonewise_core::transfer::{LabelStore, MemoryLabels, TileLabels, build_stones};
 use stonewise_io::table::{Column, Table};
 
-/// As in the step `match` of a run.
+/// Edge of the cells of coverage, metres, as in the step `match` of a run.
 const COVERAGE_CELL_M: f64 = 0.1;
 /// Where a viewpoint is put that the caller does not give, metres in front of the wall.
 const FAR_M: f64 = 1e4;

@@ -10,7 +10,7 @@ use stonewise_core::progress::Progress;
 
 /// How often Python looks at the work: often enough for a bar that moves and for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
-/// As much as the main thread of a program has.
+/// Size of the stack of a working thread, as much as the main thread of a program has, bytes.
 pub const STACK_BYTES: usize = 8 << 20;
 
 /// Python functions that are called while the work goes on.

@@ -18,9 +18,9 @@ pub(crate) struct Summary<'a> {
     pub by_status: Vec<(Status, Vec<&'a StoneRow>)>,
     /// Measured stones with their motion.
     pub measured: Vec<(&'a StoneRow, &'a RowMotion)>,
-    /// Those above their own 95 % limit.
+    /// Number of stones above their own 95 % limit.
     pub above_limit: usize,
-    /// Those that moved, with the false discovery rate over all stones controlled; largest motion first.
+    /// Stones that moved, with the false discovery rate over all stones controlled; largest motion first.
     pub moved: Vec<(&'a StoneRow, &'a RowMotion)>,
     /// The verdict on this pair of epochs.
     pub verdict: EpochVerdict,

@@ -740,7 +740,7 @@ mod tests {
 
     #[test]
     fn both_languages_fill_in_the_same_values() {
-        // The same places of both tables, as they are printed for debugging.
+        // The strings of both tables in their order, as they are printed for debugging.
         let strings = |texts: &Texts| {
             // Debugging writes a space that does not break with braces.
             let text = format!("{texts:?}").replace("\\u{a0}", " ");

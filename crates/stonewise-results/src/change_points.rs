@@ -23,7 +23,7 @@ pub struct DistancePoint {
 /// The core points of an `m3c2.csv`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct CorePoints {
-    /// Those with a distance.
+    /// Core points with a distance.
     pub distances: Vec<DistancePoint>,
     /// Places of the others, world.
     pub without_distance: Vec<Point3<f64>>,

@@ -31,7 +31,7 @@ pub struct Mistake {
 }
 
 impl Mistake {
-    /// Of no place in particular.
+    /// A mistake of no place in particular.
     pub fn new(message: impl Into<String>) -> Self {
         Self {
             message: message.into(),

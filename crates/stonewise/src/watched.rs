@@ -64,7 +64,7 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// As [`Progress::agenda`].
+    /// Takes what [`Progress::agenda`] reports.
     pub fn agenda(&mut self, steps: &[String]) {
         let step = |name: &String| StepShown {
             name: name.clone(),
@@ -75,7 +75,7 @@ impl Steps {
         self.steps = steps.iter().map(step).collect();
     }
 
-    /// As [`Progress::enter`].
+    /// Takes what [`Progress::enter`] reports.
     pub fn enter(&mut self, step: usize) {
         if self.at.is_some_and(|(at, _)| at == step) {
             return;
@@ -98,7 +98,7 @@ impl Steps {
         }
     }
 
-    /// As [`Progress::take_over`].
+    /// Takes what [`Progress::take_over`] reports.
     pub fn take_over(&mut self, step: usize) {
         if let Some(shown) = self.steps.get_mut(step)
             && shown.state == StepState::Waiting
@@ -107,7 +107,7 @@ impl Steps {
         }
     }
 
-    /// As [`Progress::begin`].
+    /// Takes what [`Progress::begin`] reports.
     pub fn begin(&mut self, what: &str, total: u64) {
         self.part = PartShown {
             what: what.to_owned(),
@@ -116,12 +116,12 @@ impl Steps {
         };
     }
 
-    /// As [`Progress::advance`].
+    /// Takes what [`Progress::advance`] reports.
     pub fn advance(&mut self, units: u64) {
         self.part.done += units;
     }
 
-    /// As [`Progress::detail`].
+    /// Takes what [`Progress::detail`] reports.
     pub fn detail(&mut self, unit: &str) {
         unit.clone_into(&mut self.part.detail);
     }
@@ -200,7 +200,7 @@ impl<'a> Watched<'a> {
         }
         *written = Some(Instant::now());
         let (steps, part) = steps.shown();
-        // Who cannot be told does not hinder the run.
+        // A file that cannot be written does not hinder the run.
         let _ = write_json(&self.file, &Told { steps, part });
     }
 

@@ -1,19 +1,18 @@
 //! Measures the adjustment on surveys with truth and true labels: the source of the tables of
 //! docs/src/accuracy.md.
 //!
-//! `cargo run --release -p stonewise-lab -- adjustment [WORD ...]`. Words, in any order: cases `still
-//! translation bulge edge crack settlement loose combo datum` (default: all; `edge`: one bulge at the end of
-//! a wall that stood still, `datum`: combo with the true motion taken out again), sensors `tls uav` (default:
-//! both; `tls-uav uav-tls`: another sensor in each epoch, with `dam`), `seeds=N` (simulated walls, default 5), `seed=N` (one of them), `dam` (the section beside the
-//! checkout instead, or that in `STONEWISE_SURVEY`), `exact` (epochs without registration and trajectory
-//! errors), `masks` (15 % of the second epoch's masks merged, halved or swapped), `paper` (the paper's
-//! estimator and M3C2 beside it), `each` (a line for every seed), `width=M height=M` (of the wall, default 4
-//! by 3), `coarse=F` (point spacing times F), `border=F` (width of the border, in noise levels, where a
-//! point's place decides and not its label, as in a run; default 3), `set:KEY=F` (a parameter of the
-//! adjustment), `scale=N` (time for about N stones), `mixes` (noise of 1, 3, 6, 11 and 20 mm and 100, 28 and 10 % of
-//! the points in the first, the second and both epochs of simulated walls; `noise=MM,... share=PERCENT,...` for
-//! others).
-//! A row holds medians over the seeds. Millimetres.
+//! `cargo run --release -p stonewise-lab -- adjustment [WORD ...]`. Words, in any order: cases `still translation bulge
+//! edge crack settlement loose combo datum` (default: all; `edge`: one bulge at the end of a wall that stood still,
+//! `datum`: combo with the true motion taken out again), sensors `tls uav` (default: both; `tls-uav uav-tls`: another
+//! sensor in each epoch, with `dam`), `seeds=N` (simulated walls, default 5), `seed=N` (one of them), `dam` (the
+//! section beside the checkout instead, or that in `STONEWISE_SURVEY`), `exact` (epochs without registration and
+//! trajectory errors), `masks` (15 % of the second epoch's masks merged, halved or swapped), `paper` (the paper's
+//! estimator and M3C2 beside it), `each` (a line for every seed), `width=M height=M` (of the wall, default 4 by 3),
+//! `coarse=F` (point spacing times F), `border=F` (width of the border, in noise levels, where a point's place decides
+//! and not its label, as in a run; default 3), `set:KEY=F` (a parameter of the adjustment), `scale=N` (time for about N
+//! stones), `mixes` (noise of 1, 3, 6, 11 and 20 mm and 100, 28 and 10 % of the points in the first, the second and
+//! both epochs of simulated walls; `noise=MM,... share=PERCENT,...` for others). A row holds medians over the seeds.
+//! Millimetres.
 
 mod bound;
 mod dam;

@@ -8,9 +8,9 @@ use super::braces::fill;
 pub struct Message {
     /// Name under which `docs/src/messages.md` explains it; absent for words that are part of a sentence.
     pub code: Option<&'static str>,
-    /// As a run says it.
+    /// The text in English, as a run prints it.
     pub english: &'static str,
-    /// As a German report says it.
+    /// The text in German, as a German report prints it.
     pub german: &'static str,
 }
 

@@ -10,9 +10,9 @@ pub struct Said {
     /// Name under which `docs/src/messages.md` explains the sentence; absent for values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub code: Option<String>,
-    /// As a run says it.
+    /// The text in English, as a run prints it.
     pub english: String,
-    /// As a German report says it; absent where there are no German words.
+    /// The text in German, as a German report prints it; absent where there are no German words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub german: Option<String>,
 }
@@ -36,7 +36,7 @@ impl Said {
         }
     }
 
-    /// As a report in German says it: in English where there are no German words.
+    /// The text of a report in German; in English where there are no German words.
     pub fn in_german(&self) -> &str {
         self.german.as_deref().unwrap_or(&self.english)
     }

@@ -16,7 +16,7 @@ pub struct MeshIndex {
     edge_normals: Vec<[Vector3<f64>; 3]>,
     /// Normals of the faces at each vertex, weighted with their angles there.
     vertex_normals: Vec<Vector3<f64>>,
-    /// A sphere around each triangle, which tells cheaply that a triangle is too far.
+    /// A sphere around each triangle, a cheap test for triangles that are too far.
     spheres: Vec<Sphere>,
     origin: Point3<f64>,
     cell_m: f64,

@@ -67,7 +67,7 @@ pub fn m3c2_survey<A: TileSource, B: TileSource>(
 pub struct PointDistances {
     /// World frame, metres.
     pub points: Vec<Point3<f64>>,
-    /// Of each point, metres; `None`: farther than was looked for.
+    /// Distance of each point, metres; `None`: farther than was looked for.
     pub distances_m: Vec<Option<f64>>,
 }
 

@@ -116,7 +116,7 @@ impl GridIndex {
         });
     }
 
-    /// As [`within`](Self::within), with the position in place of the distance.
+    /// The points that [`within`](Self::within) finds, with their positions in place of the distances.
     #[inline]
     pub fn positions_within(
         &self,

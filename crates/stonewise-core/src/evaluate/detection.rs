@@ -8,19 +8,19 @@ use serde::{Deserialize, Serialize};
 pub struct Detection {
     /// Samples that truly stayed.
     pub still: usize,
-    /// Of these, how many raised an alarm.
+    /// Samples that truly stayed and raised an alarm.
     pub false_alarms: usize,
     /// `false_alarms` / `still`; about 0.05 is right.
     pub false_alarm_rate: Option<f64>,
     /// Samples that truly moved.
     pub moved: usize,
-    /// Of these, how many raised an alarm.
+    /// Samples that truly moved and raised an alarm.
     pub hits: usize,
     /// `hits` / `moved`.
     pub hit_rate: Option<f64>,
     /// Samples that truly moved by more than their own detection limit.
     pub detectable: usize,
-    /// Of these, how many raised an alarm.
+    /// Samples that truly moved by more than their own detection limit and raised an alarm.
     pub detectable_hits: usize,
     /// `detectable_hits` / `detectable`.
     pub detectable_hit_rate: Option<f64>,

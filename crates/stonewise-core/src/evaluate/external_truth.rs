@@ -37,7 +37,7 @@ pub type Owned = (StoneOutcome, Option<StoneId>);
 pub struct TruthScore {
     /// Stones that count: visible enough in both epochs and not at the edge.
     pub countable: usize,
-    /// Of these, stones with a displacement.
+    /// Countable stones with a displacement.
     pub found: usize,
     /// `found` / `countable`.
     pub found_share: Option<f64>,

@@ -17,17 +17,17 @@ pub struct LabelConfusion {
 pub struct LabelScore {
     /// Points of the true stones that are scored.
     pub stone_points: u64,
-    /// Of these, points that carry the one label that stands for their stone.
+    /// Points of stones that carry the one label that stands for their stone.
     pub right: u64,
-    /// Of these, points without a label.
+    /// Points of stones without a label.
     pub unlabelled: u64,
-    /// Of these, points that carry another label.
+    /// Points of stones that carry another label.
     pub wrong: u64,
     /// `right` / `stone_points`.
     pub right_share: Option<f64>,
     /// Points without a true stone.
     pub background_points: u64,
-    /// Of these, points that carry a label.
+    /// Points without a true stone that carry a label.
     pub false_labels: u64,
     /// Share of right points of each true stone.
     pub per_stone: BTreeMap<u32, f64>,

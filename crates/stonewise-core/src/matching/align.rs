@@ -20,7 +20,7 @@ const PAIR_AREA_RATIO: f64 = 0.75;
 const MAX_ALIKE: usize = 4000;
 /// Stones around a pair that say whether a motion is worth a closer look.
 const LOCAL: usize = 12;
-/// Of these, as many must agree as chance does not bring together once in a thousand.
+/// Number of these stones that must agree: chance does not bring as many together once in a thousand.
 const LOCAL_SAME: usize = 6;
 /// Motions that are looked at closely.
 const CANDIDATES: usize = 24;

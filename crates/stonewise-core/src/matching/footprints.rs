@@ -1,4 +1,4 @@
-//! Where the stones of an epoch lie, coarsely, as a third witness beside centroids and areas.
+//! Where the stones of an epoch lie, coarsely, as a third criterion beside centroids and areas.
 
 use crate::geometry::{CellMap, floor};
 use crate::id::StoneId;

@@ -144,7 +144,7 @@ struct Trial {
 struct Sides<'a> {
     first: Centroids<'a>,
     second: Centroids<'a>,
-    /// Those of the first epoch where the second is expected to show them.
+    /// Stones of the first epoch where the second is expected to show them.
     back: Centroids<'a>,
 }
 

@@ -10,14 +10,14 @@ use std::collections::BTreeSet;
 pub struct LaterStones<'a> {
     /// All of them.
     pub stones: &'a [Stone],
-    /// Those that are stones of the reference.
+    /// Stones of this epoch that are stones of the reference.
     pub known: &'a BTreeSet<StoneId>,
 }
 
 /// A stone that the reference does not show.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
-    /// As the first epoch shows it that shows it, with a number of its own.
+    /// The stone in the first epoch that shows it, with a number of its own.
     pub stone: Stone,
     /// Its number in each epoch, in the order given; `None`: not shown.
     pub seen: Vec<Option<StoneId>>,

@@ -50,7 +50,7 @@ pub struct RangeImage {
     cells: Raster<(f32, f64)>,
     /// Map pixels per photo pixel.
     scale: f64,
-    /// Of a pinhole camera that stands for the photo's, map pixels.
+    /// Focal lengths of a pinhole camera that stands for the photo's, map pixels.
     focal_px: [f64; 2],
     center_px: [f64; 2],
 }
@@ -180,7 +180,7 @@ struct Face {
 struct Sums {
     pixels: f64,
     q: f64,
-    /// Of x, y; of xx, xy, yy; of xq, yq.
+    /// Sums of x, y; of xx, xy, yy; of xq, yq.
     first: [f64; 2],
     second: [f64; 3],
     mixed: [f64; 2],

@@ -63,7 +63,7 @@ impl Term {
 pub struct Basis {
     /// Its terms in the order of the columns, the season last.
     pub terms: Vec<Term>,
-    /// Of each the value at which its column is zero: the mean over the epochs, 0 of the season.
+    /// Value of each term at which its column is zero: the mean over the epochs, 0 of the season.
     pub zero: Vec<f64>,
 }
 

@@ -15,7 +15,7 @@ const NORMAL_FROM: f64 = 1e6;
 /// claimed variance are a variance of its own, drawn from a scaled inverse chi-square distribution.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VarianceFactor {
-    /// Of a typical stone; at least 1.
+    /// Variance factor of a typical stone; at least 1.
     pub factor: f64,
     /// For how many degrees of freedom it counts beside a stone's own; null: all stones err alike.
     pub freedom: Option<f64>,

@@ -14,7 +14,7 @@ pub struct Outside {
 }
 
 impl Outside {
-    /// That of cells whose normals point outside.
+    /// The outside of a surface of cells whose normals point outside.
     pub fn of(cells: &[SurfaceCell]) -> Self {
         let centroids: Vec<Point3<f64>> = cells.iter().map(|c| c.centroid).collect();
         Self {

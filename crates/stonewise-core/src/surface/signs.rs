@@ -22,7 +22,7 @@ pub(super) struct Parts {
     pub members: Vec<Vec<usize>>,
     /// The part of each cell.
     pub of_cell: Vec<usize>,
-    /// Between the parts.
+    /// Ties between the parts.
     pub ties: Ties,
 }
 

@@ -46,7 +46,7 @@ impl SplatDepth {
         }
     }
 
-    /// As bytes, for [`Self::decode`].
+    /// Encodes the map as bytes, for [`Self::decode`].
     pub(super) fn encode(&self) -> Vec<u8> {
         let mut out = Writer::default();
         out.f64(self.scale);

@@ -45,7 +45,7 @@ impl DepthBounds {
         Self { columns, blocks }
     }
 
-    /// Those around a pixel of the map; `None` outside.
+    /// Bounds of the depth around a pixel of the map; `None` outside.
     #[inline]
     pub(super) fn at(&self, pixel: [f64; 2]) -> Option<[f32; 2]> {
         let [column, row] = pixel.map(|p| p as u32 as usize / EDGE);

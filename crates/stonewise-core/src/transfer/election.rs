@@ -31,7 +31,7 @@ impl Election {
         self.masked.iter().map(view).collect()
     }
 
-    /// As bytes, for [`Self::decode`].
+    /// Encodes the election as bytes, for [`Self::decode`].
     pub fn encode(&self) -> Vec<u8> {
         let mut out = Writer::default();
         out.f64(self.spacing_m);

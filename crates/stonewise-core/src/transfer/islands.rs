@@ -67,7 +67,7 @@ impl Occupancy {
         }
     }
 
-    /// As bytes, for [`Self::decode`]; the same for the same counts.
+    /// Encodes the counts as bytes, for [`Self::decode`]; equal counts give equal bytes.
     pub fn encode(&self) -> Vec<u8> {
         let mut out = Writer::default();
         out.f64(self.voxel_m);

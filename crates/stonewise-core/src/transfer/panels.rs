@@ -54,7 +54,7 @@ struct Relief {
 }
 
 impl StoneReliefs {
-    /// Of stones whose points are not yet added.
+    /// The reliefs of stones whose points are not yet added.
     pub fn new(stones: &[Stone]) -> Self {
         let relief = |stone: &Stone| Relief {
             centroid: stone.centroid,

@@ -27,7 +27,7 @@ const BLOCK_PX: usize = 16;
 const MIXED: u32 = u32::MAX;
 
 impl RunLabels {
-    /// Those of a photo that is not read.
+    /// The labels of a photo that is not read.
     pub(super) fn none() -> Self {
         Self {
             width: 0,

@@ -45,12 +45,12 @@ impl LocalSurface {
 
 /// Local surface in cubic cells of a tile.
 pub(super) struct SurfaceCells {
-    /// Of the tile, world frame.
+    /// Origin of the tile, world frame.
     origin: Point3<f64>,
     cell_m: f64,
     /// Ascending.
     keys: Vec<[i32; 3]>,
-    /// Of each key.
+    /// Surface of each key's cell.
     surfaces: Vec<LocalSurface>,
 }
 
@@ -124,7 +124,7 @@ impl SurfaceCells {
             .collect()
     }
 
-    /// As bytes, for [`Self::decode`].
+    /// Encodes the cells as bytes, for [`Self::decode`].
     pub(super) fn encode(&self) -> Vec<u8> {
         let mut out = Writer::default();
         self.origin.iter().for_each(|&v| out.f64(v));

@@ -38,11 +38,11 @@ pub(super) struct Observer<'a> {
     labels: Vec<RunLabels>,
     depths: Vec<SplatDepth>,
     bounds: Vec<DepthBounds>,
-    /// Of the tiles from `first_tile` on.
+    /// Surfaces of the tiles from `first_tile` on.
     surfaces: Vec<SurfaceCells>,
     first_tile: usize,
     params: &'a TransferParams,
-    /// Of the steepest incidence at which a photo votes.
+    /// Cosine of the steepest incidence at which a photo votes.
     least_cosine: f64,
 }
 
@@ -234,7 +234,7 @@ impl<'a> Observer<'a> {
 struct Look<'a> {
     photo: u32,
     surface: &'a LocalSurface,
-    /// Of the cell, in the frame of the camera; `None` where it has none.
+    /// Normal of the cell, in the frame of the camera; `None` where it has none.
     normal: Option<Vector3<f64>>,
     /// Depth tolerance of a point seen at a right angle, metres.
     least_tolerance_m: f64,

@@ -83,9 +83,9 @@ pub fn plan_views(cells: &[SurfaceCell], params: &ViewParams) -> Vec<PlannedView
 struct Scene<'a> {
     /// All cells.
     cells: &'a [SurfaceCell],
-    /// Of the walls.
+    /// Bodies of the walls.
     bodies: Bodies,
-    /// Of a target.
+    /// Least cells of a target.
     least_cells: usize,
 }
 

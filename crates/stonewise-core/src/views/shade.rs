@@ -14,8 +14,8 @@ pub(super) enum Side {
 ///
 /// `half_window`: half the side of the window of a slope, pixels, which smooths the noise of single points.
 ///
-/// Lambert's law for a distant light from the upper left, or from the upper right. Darker joints, as under the light of the sky, let the
-/// detector find fewer stones.
+/// Lambert's law for a distant light from the upper left, or from the upper right. Darker joints, as under the light of
+/// the sky, let the detector find fewer stones.
 pub(super) fn relief_shade(depth: &DepthMap, camera: &Camera, side: Side, half_window: usize) -> RgbImage {
     let (width, height) = (depth.width() as usize, depth.height() as usize);
     let mean = mean_depth(depth);

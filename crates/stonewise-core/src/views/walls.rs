@@ -23,7 +23,7 @@ pub struct Walls<'a> {
 }
 
 impl<'a> Walls<'a> {
-    /// Those among the cells of a survey, whose edge is `cell_m`.
+    /// The walls among the cells of a survey, whose edge is `cell_m`.
     pub fn among(cells: &'a [SurfaceCell], cell_m: f64) -> Self {
         let is_upright = |c: &&SurfaceCell| c.normal.z.abs() < LEVEL;
         let (upright, level): (Vec<_>, Vec<_>) = cells.iter().partition(is_upright);

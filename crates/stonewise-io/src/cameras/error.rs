@@ -92,7 +92,7 @@ pub enum CameraError {
         camera: String,
         /// One photo.
         first: PathBuf,
-        /// The other.
+        /// The other photo.
         second: PathBuf,
     },
 }

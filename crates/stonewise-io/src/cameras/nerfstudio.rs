@@ -28,7 +28,7 @@ struct Frame {
     own: RawCamera,
 }
 
-/// Of all photos, or of one.
+/// The camera of all photos, or of one.
 #[derive(Default, Deserialize)]
 struct RawCamera {
     camera_model: Option<String>,

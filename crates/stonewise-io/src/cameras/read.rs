@@ -8,7 +8,7 @@ use super::{
 use std::path::Path;
 use stonewise_core::geometry::View;
 
-/// Pixels of the largest photo that is believed in.
+/// Pixels of the largest photo that is accepted.
 const MAX_PIXELS: u64 = 1 << 30;
 
 /// Reads a camera file of any of the known formats.
@@ -44,8 +44,8 @@ pub fn read_cameras(path: &Path) -> Result<CameraFile, CameraError> {
     read_cameras_on_map(path, None, &MapFrame::default())
 }
 
-/// As [`read_cameras`], for clouds whose place on the map is known, and with the folder of the photos where it is
-/// another than that of the camera file.
+/// Reads cameras as [`read_cameras`] does, for clouds whose place on the map is known, and with the folder of the
+/// photos where it is another than that of the camera file.
 ///
 /// Metashape stores the poses of georeferenced chunks earth-centred. They are brought to the system of the
 /// clouds; without one, to the chunk's own if it is a projected one. Transverse Mercator grids and Lambert's

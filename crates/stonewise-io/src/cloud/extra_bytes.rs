@@ -187,8 +187,8 @@ pub fn description_record(descriptors: Vec<u8>) -> las::Vlr {
 
 /// The dimensions of a file with `extra_bytes` per point.
 ///
-/// Bytes that no description covers become dimensions of undocumented bytes, so that what follows them is
-/// found in its place. Descriptions that do not fit the record are not believed.
+/// Bytes that no description covers become dimensions of undocumented bytes, so that what follows them is found in its
+/// place. Descriptions that do not fit the record are ignored.
 pub fn existing<'a>(records: impl Iterator<Item = &'a las::Vlr>, extra_bytes: u16) -> Vec<ExistingDimension> {
     let total = usize::from(extra_bytes);
     let mut found = Vec::new();

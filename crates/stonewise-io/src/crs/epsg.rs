@@ -49,7 +49,7 @@ pub struct Geographic {
     pub semi_major_m: &'static str,
     pub inverse_flattening: &'static str,
     pub meridian: &'static str,
-    /// Of the prime meridian, from Greenwich, degrees.
+    /// Longitude of the prime meridian, from Greenwich, degrees.
     pub meridian_degrees: &'static str,
     pub unit: &'static str,
     pub radians: &'static str,

@@ -57,9 +57,10 @@ pub enum LayerError {
 
 /// Writes layers into a new GeoPackage; replaces the file at `path` when all is written.
 ///
-/// Columns are `fid`, `geom` and those of each layer's table; their units and meanings ([`Table::push`]) are
-/// in `gpkg_data_columns`. A feature with too few or infinite vertices has no geometry. `last_change`: time stamp of the content, as `2026-04-30T12:00:00.000Z`; given, not taken
-/// from the clock, so that the same results give the same bytes.
+/// Columns are `fid`, `geom` and those of each layer's table; their units and meanings ([`Table::push`]) are in
+/// `gpkg_data_columns`. A feature with too few or infinite vertices has no geometry. `last_change`: time stamp of the
+/// content, as `2026-04-30T12:00:00.000Z`; given, not taken from the clock, so that the same results give the same
+/// bytes.
 ///
 /// # Errors
 /// A name cannot be used, lengths differ, or the file cannot be written; an earlier file is kept then.

@@ -81,7 +81,7 @@ pub enum MaskError {
         photo: String,
         /// One entry.
         first: String,
-        /// The other.
+        /// The other entry.
         second: String,
     },
     /// A PNG that is not a label image.

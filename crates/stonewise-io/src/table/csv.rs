@@ -18,11 +18,11 @@ const LARGE: f64 = 1e15;
 
 /// Writes a table as CSV: a header line, then one line per row, `\n` at each end.
 ///
-/// An empty cell stays empty; an empty string is written as `""`. Floats are rounded to what a reader can use:
-/// metres and radians to seven decimals, all others to six significant digits, of which none before the
-/// decimal point is lost; Parquet files keep every bit. Booleans are 1 and 0. Text is quoted where it holds a comma, a quote, a line break
-/// or spaces at an end (RFC 4180). Text that a spreadsheet would take for a formula, because it begins with
-/// =, +, - or @, gets an apostrophe in front.
+/// An empty cell stays empty; an empty string is written as `""`. Floats are rounded to what a reader can use: metres
+/// and radians to seven decimals, all others to six significant digits, of which none before the decimal point is lost;
+/// Parquet files keep every bit. Booleans are 1 and 0. Text is quoted where it holds a comma, a quote, a line break or
+/// spaces at an end (RFC 4180). Text that a spreadsheet would take for a formula, because it begins with =, +, - or @,
+/// gets an apostrophe in front.
 ///
 /// Units and meanings of the columns go into `NAME.csv-metadata.json` beside it (W3C CSV on the Web).
 /// `description`: what the table as a whole holds. `primary_key`: the column that identifies a row, if there

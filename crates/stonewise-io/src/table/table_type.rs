@@ -46,7 +46,7 @@ impl Table {
         Ok(())
     }
 
-    /// As [`push`](Self::push), for a column whose metadata, if any, are set already.
+    /// Adds a column as [`push`](Self::push) does, but one whose metadata, if any, are set already.
     pub(super) fn push_column(&mut self, name: &str, column: Column) -> Result<(), TableError> {
         if !self.columns.is_empty() && column.len() != self.rows() {
             return Err(TableError::Rows {

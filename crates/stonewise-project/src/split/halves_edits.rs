@@ -9,9 +9,9 @@ use stonewise_base::error::{Error, Result};
 
 /// Edits as the project of the halves names them.
 pub(super) struct HalvesEdits {
-    /// Those that concern the epoch; both halves show the same wall, so each of them concerns both.
+    /// Edits that concern the epoch; both halves show the same wall, so each of them concerns both.
     pub file: EditsFile,
-    /// Those that concern it and cannot be applied to its halves, with the reason.
+    /// Edits that concern it and cannot be applied to its halves, with the reason.
     pub left_out: Vec<String>,
 }
 

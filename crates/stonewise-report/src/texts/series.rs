@@ -10,7 +10,7 @@ pub(crate) struct SeriesTexts {
     pub question: &'static str,
     pub answer: &'static str,
     pub words: [&'static str; 3],
-    /// As predicted, as in the past, trend, anomaly.
+    /// The four questions: as predicted, as in the past, trend, anomaly.
     pub questions: [&'static str; 4],
     pub intro: &'static str,
     pub cannot_tell: &'static str,

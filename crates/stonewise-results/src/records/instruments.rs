@@ -21,9 +21,9 @@ pub struct InstrumentsEpoch {
     pub epoch: String,
     /// Probability of so large differences of all instruments together by chance; absent where nothing can be tested.
     pub p: Option<f64>,
-    /// Those that are compared, by file and name.
+    /// Instruments that are compared, by file and name.
     pub compared: Vec<ComparedInstrument>,
-    /// Those that are not.
+    /// Instruments that are not compared.
     pub left_out: Vec<LeftOutInstrument>,
     /// What those in use did to the datum; absent where none is in use.
     pub datum: Option<DatumUse>,

@@ -40,7 +40,7 @@ pub struct TrendsRecord {
 pub struct ZoneTrend {
     /// Epoch of the zone; empty for the wall.
     pub epoch: String,
-    /// As in the stone table of the epoch; 0 for the wall.
+    /// Number of the zone, as in the stone table of the epoch; 0 for the wall.
     pub zone_id: u32,
     /// Its stones that have a model.
     pub stones: usize,
@@ -110,7 +110,7 @@ pub struct PathPoint {
 pub struct CurvePoint {
     /// The day.
     pub date: String,
-    /// As in the path.
+    /// What the model gives, as in the path.
     #[serde(flatten)]
     pub model: EstimateRecord,
     /// Whether the day comes after the newest epoch, or its conditions lie beyond those of the epochs.

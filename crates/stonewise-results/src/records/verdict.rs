@@ -223,7 +223,7 @@ pub struct Area {
     pub reasons: Vec<ReasonCode>,
     /// Stones of the first epoch in it.
     pub stones: usize,
-    /// Those that were measured.
+    /// Stones that were measured.
     pub measured: usize,
     /// Measured stones above their own 95 % limit, of which chance alone gives 5 % on a still wall.
     pub above_limit: usize,
@@ -332,7 +332,7 @@ pub struct DeformationVerdict {
 /// A zone of deformation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DeformedZone {
-    /// As in the stone table.
+    /// Number of the zone, as in the stone table.
     pub zone_id: u32,
     /// State by its interval.
     pub state: State,

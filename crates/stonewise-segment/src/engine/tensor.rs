@@ -41,7 +41,7 @@ impl Tensor {
         }
     }
 
-    /// The derivative with regard to this leaf; `None` where it is none or nothing depends on it.
+    /// The derivative with respect to this leaf; `None` where it is not a leaf or nothing depends on it.
     pub fn derivative(&self, derivatives: &mut Derivatives) -> Option<Vec<f32>> {
         derivatives.take(self.node.as_ref()?)
     }

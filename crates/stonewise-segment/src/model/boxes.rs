@@ -7,7 +7,7 @@ pub type Bounds = [f32; 4];
 pub const HEAD_WEIGHTS: [f32; 4] = [10.0, 10.0, 5.0, 5.0];
 /// Weights of the proposal network's offsets.
 pub const PROPOSAL_WEIGHTS: [f32; 4] = [1.0, 1.0, 1.0, 1.0];
-/// Largest log of a growth in size that is believed: a factor 1000 / 16.
+/// Largest logarithm of a growth in size that is accepted: a factor 1000 / 16.
 const MAX_LOG_SCALE: f32 = 4.135_166_6;
 
 /// Area of a box, square pixels.

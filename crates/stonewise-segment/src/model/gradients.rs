@@ -32,7 +32,7 @@ impl Gradients {
         squares.sum::<f64>().sqrt()
     }
 
-    /// That of a parameter.
+    /// The gradient of a parameter.
     pub fn get(&self, name: &str) -> Option<&[f32]> {
         self.0.get(name).map(Vec::as_slice)
     }

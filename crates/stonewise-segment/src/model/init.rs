@@ -1,4 +1,4 @@
-//! First values of a model's parameters, the same for the same seed on every machine.
+//! Initial values of a model's parameters; equal seeds give equal values on every machine.
 
 use super::parameter::Param;
 use crate::engine::Tensor;

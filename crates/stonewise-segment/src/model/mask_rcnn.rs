@@ -53,7 +53,7 @@ pub(super) struct Sight {
 }
 
 impl MaskRcnn {
-    /// A model with random weights, the same for the same seed.
+    /// A model with random weights; equal seeds give equal weights.
     ///
     /// # Errors
     /// The configuration makes no sense.
@@ -290,7 +290,7 @@ impl MaskRcnn {
     }
 }
 
-/// Of masks [regions, classes, rows, columns] those of given (region, class): [pairs, rows, columns].
+/// Selects from masks [regions, classes, rows, columns] those of given (region, class): [pairs, rows, columns].
 pub(super) fn of_classes(masks: Tensor, pairs: impl Iterator<Item = (usize, usize)>) -> Tensor {
     let [regions, classes, rows, columns] = masks.dims();
     let places = pairs.map(|(region, class)| region * classes + class);

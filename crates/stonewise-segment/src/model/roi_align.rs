@@ -40,7 +40,7 @@ struct PyramidShape {
 }
 
 impl FeatureRows {
-    /// Of levels [batch, channels, rows, columns], finest first.
+    /// The rows of levels [batch, channels, rows, columns], finest first.
     pub fn new(levels: &[Tensor]) -> Self {
         let levels = &levels[..LEVELS.min(levels.len())];
         let [batch, channels] = levels[0].dims();

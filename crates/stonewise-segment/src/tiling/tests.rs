@@ -9,7 +9,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use stonewise_core::progress::Silent;
 use stonewise_core::raster::{LabelImage, Raster, ReliefMap, RgbImage, connected_components};
 
-/// Levels of a colour channel, far enough apart to be told when pixels are averaged.
+/// Levels of a colour channel, far enough apart to be distinguished when pixels are averaged.
 const LEVELS: [u8; 4] = [0, 85, 170, 255];
 
 /// Cells around points of a jittered grid, with joints between them; every fifth cell swallows a neighbour.

@@ -49,9 +49,9 @@ pub struct AdamW {
 /// Running means for one parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moments {
-    /// Of gradients.
+    /// Running mean of the gradients.
     pub mean: Vec<f32>,
-    /// Of their squares.
+    /// Running mean of their squares.
     pub square: Vec<f32>,
 }
 

@@ -19,8 +19,7 @@ pub enum Start {
     Weights(Weights),
 }
 
-/// How long a training lasts that does not say it, minutes: enough to learn a wall from a few labelled photos
-/// on two CPU cores.
+/// Default duration of a training, minutes: enough to learn a wall from a few labelled photos on two CPU cores.
 const DEFAULT_MINUTES: f64 = 30.0;
 
 /// Takes up the training in a folder, or starts one where there is none.

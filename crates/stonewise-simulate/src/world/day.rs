@@ -36,7 +36,7 @@ pub enum LaterLight {
     /// By chance, as that of the first epoch.
     #[default]
     Other,
-    /// That of the first epoch.
+    /// The light of the first epoch.
     Same,
     /// The sky alone.
     Overcast,

@@ -38,7 +38,7 @@ use stonewise_core::progress::Silent;
 
 /// Where the API begins.
 const API: &str = "/api/v1";
-/// Most pages that are told of changes at a time.
+/// Most pages that receive changes at a time.
 const WATCHERS: usize = 24;
 /// Time between two events of one page at least, and at most.
 const EVENTS: (Duration, Duration) = (Duration::from_millis(150), Duration::from_secs(4));
@@ -561,7 +561,7 @@ impl Api {
         })
     }
 
-    /// Does something in the background that others are told of; one at a time.
+    /// Does something in the background and reports it to the pages; one at a time.
     fn work<T: FnOnce(&mut RunShown)>(
         self: &Arc<Self>,
         job: Job,

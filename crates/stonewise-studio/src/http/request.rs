@@ -82,7 +82,7 @@ pub struct Request {
 pub(super) enum NoRequest {
     /// The other side has gone, or was too slow.
     Gone,
-    /// It is answered with this, and the connection ends.
+    /// The request is answered with this, and the connection ends.
     Refused(Response),
 }
 

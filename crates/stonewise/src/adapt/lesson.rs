@@ -101,7 +101,7 @@ struct Taught {
     stones: Vec<StoneId>,
     /// How many of them the detector had missed here.
     missed: usize,
-    /// Those of them that a person corrected.
+    /// Stones of these that a person corrected.
     corrected: Vec<StoneId>,
     /// How many masks a person said are no stones.
     deleted: usize,
@@ -330,13 +330,13 @@ struct Shown<'a> {
 /// Pixels of a stone in a photo, where the cloud says anything.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pixels {
-    /// Of the stone in the cloud.
+    /// Pixels of the stone in the cloud.
     cloud: u64,
-    /// Of its masks.
+    /// Pixels of its masks.
     mask: u64,
-    /// Of both.
+    /// Pixels of both.
     both: u64,
-    /// Of the stone in the cloud, under the masks of others.
+    /// Pixels of the stone in the cloud, under the masks of others.
     foreign: u64,
     /// Whether the stone reaches the border of the photo.
     is_cut: bool,

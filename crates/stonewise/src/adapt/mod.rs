@@ -56,11 +56,11 @@ pub struct Adapted {
     pub photos: usize,
     /// Stones that the survey confirms.
     pub stones: usize,
-    /// Of these, the stones that are kept for measuring.
+    /// Confirmed stones that are kept for measuring.
     pub kept: usize,
     /// Masks that were taught, counted in each photo.
     pub masks: usize,
-    /// Of these, masks of stones that the detector had missed in the photo.
+    /// Taught masks of stones that the detector had missed in the photo.
     pub missed: usize,
     /// Masks of stones that a person corrected, and masks that a person said are no stones.
     pub corrected: usize,
@@ -72,7 +72,7 @@ pub struct Adapted {
     pub from: PathBuf,
     /// Its figures on the stones that were kept.
     pub before: MaskScore,
-    /// Those of the trained detector.
+    /// Score of the trained detector.
     pub after: MaskScore,
     /// Change of F1.
     pub gain: f64,
@@ -158,8 +158,8 @@ pub fn teach(
     })
 }
 
-/// Trains in a folder in `training`; what came of it, and the detector. `at`: is told which step of [`TEACHING`]
-/// begins.
+/// Trains in a folder in `training`; returns what the adaptation did, and the detector. `at`: called with the step of
+/// [`TEACHING`] that begins.
 fn learn(run: &Run, minutes: f64, training: &Path, at: &dyn Fn(usize)) -> Result<(Adapted, PathBuf)> {
     let (project, progress) = (run.context.project, run.context.progress);
     at(0);

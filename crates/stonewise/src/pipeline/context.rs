@@ -117,7 +117,7 @@ impl<'a> Context<'a> {
         self.step_publishing(name, key, &[], make)
     }
 
-    /// As [`Self::step`], for a step that makes files outside its folder too.
+    /// Does a step as [`Self::step`] does, for a step that makes files outside its folder too.
     pub fn step_publishing<'n>(
         &self,
         name: impl Into<Name<'n>>,

@@ -18,7 +18,7 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// Of a unit that reads no file of the survey.
+    /// The cost of a unit that reads no file of the survey.
     pub const fn of(cores: u32, bytes: u64) -> Self {
         Self {
             cores,

@@ -55,7 +55,7 @@ pub struct Need {
     when: fn(&Project, EpochId) -> bool,
 }
 
-/// Of which epochs a step is needed.
+/// The epochs of which a step is needed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Of {
     Same,
@@ -65,22 +65,22 @@ pub(super) enum Of {
 }
 
 impl Need {
-    /// That of the same epoch, or of the survey.
+    /// The need for a step of the same epoch, or of the survey.
     pub const fn same(step: &'static Step) -> Self {
         Self::of(step, Of::Same)
     }
 
-    /// That of the reference.
+    /// The need for a step of the reference.
     pub const fn reference(step: &'static Step) -> Self {
         Self::of(step, Of::Reference)
     }
 
-    /// That of the epoch after the reference.
+    /// The need for a step of the epoch after the reference.
     pub const fn first_later(step: &'static Step) -> Self {
         Self::of(step, Of::FirstLater)
     }
 
-    /// Those of all epochs.
+    /// The need for a step of all epochs.
     pub const fn all(step: &'static Step) -> Self {
         Self::of(step, Of::All)
     }

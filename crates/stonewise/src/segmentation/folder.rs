@@ -74,7 +74,7 @@ pub struct PhotoScore {
 /// What is kept of a photo that is done, besides its label image.
 #[derive(Serialize, Deserialize)]
 struct Done {
-    /// Of the photo.
+    /// Digest of the photo.
     digest: String,
     /// Its label image, as it was left.
     labels: Kept,

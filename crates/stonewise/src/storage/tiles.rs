@@ -126,7 +126,7 @@ fn start_of_batch(points: &[u64], number: usize, count: usize) -> usize {
         .count()
 }
 
-/// Of each point of a tile: its number in the epoch's list of sources, and its time since that source began,
+/// Origin of each point of a tile: its number in the epoch's list of sources, and its time since that source began,
 /// seconds.
 pub struct TileOrigins {
     /// Entry of `sources.json`.
@@ -212,7 +212,7 @@ pub struct TileValues {
 }
 
 impl TileValues {
-    /// As core takes them.
+    /// The values as references, as stonewise-core takes them.
     pub fn borrowed(&self) -> PointValues<'_> {
         PointValues {
             colours: &self.colours,

@@ -6,9 +6,9 @@ use serde_json::Value;
 /// How far two numbers may lie apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Tolerance {
-    /// As they are.
+    /// Absolute difference.
     pub absolute: f64,
-    /// As a share of the larger.
+    /// Difference as a share of the larger number.
     pub relative: f64,
 }
 
@@ -23,7 +23,7 @@ impl Tolerance {
         absolute: 1e-6,
         relative: 1e-3,
     };
-    /// Between processors of different classes, and builds of the same method: 0.03 mm or mrad, and three
+    /// Tolerance between processors of different classes, and builds of the same method: 0.03 mm or mrad, and three
     /// hundredths.
     pub const MACHINES: Self = Self {
         absolute: 3e-5,

@@ -32,7 +32,7 @@ impl fmt::Display for Answer {
 /// One comparison.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// Of which kind: `files`, `tables`, `inputs` or `again`.
+    /// Kind of the comparison: `files`, `tables`, `inputs` or `again`.
     pub kind: &'static str,
     /// The file or the group of files.
     pub subject: String,

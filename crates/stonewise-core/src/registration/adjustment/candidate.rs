@@ -16,9 +16,9 @@ const LONGER: f64 = 1.3;
 /// How a stone may have moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Moving {
-    /// As its neighbours predict.
+    /// It moved as its neighbours predict.
     WithField,
-    /// On its own, as loose stones do.
+    /// It moved on its own, as loose stones do.
     OnOwn,
 }
 

@@ -27,7 +27,7 @@ impl Adjustment {
         with_field.into_iter().enumerate().map(of_stone).collect()
     }
 
-    /// Those of stones that move with the field, for an error of their motions in the face.
+    /// Normal equations of all stones, moving with the field, for an error of their motions in the face.
     pub fn equations_with_field(&self, error_m: f64) -> Vec<NormalEquations> {
         let stones = self.stones.iter().enumerate();
         stones
@@ -35,7 +35,7 @@ impl Adjustment {
             .collect()
     }
 
-    /// Those of a stone that moves on its own; `None` where they are those of moving with the field.
+    /// Normal equations of a stone that moves on its own; `None` where they are those of moving with the field.
     fn on_own(&self, i: usize, error_m: f64) -> Option<NormalEquations> {
         let stone = &self.stones[i];
         match &stone.on_own {

@@ -15,7 +15,7 @@ use crate::registration::points::PairSource;
 pub(super) struct Run<'a, S> {
     points: Points<'a, S>,
     adjustment: Adjustment,
-    /// Of the last iteration.
+    /// Solution of the last iteration.
     last: Option<Solution>,
     iterations: usize,
     /// Most iterations; each crack that is found adds as many again.

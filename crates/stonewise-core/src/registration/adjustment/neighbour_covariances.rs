@@ -75,12 +75,12 @@ struct Measured<'a> {
     estimate: &'a Estimate,
     face_from_world: &'a Matrix3<f64>,
     photos: Option<PhotoPart<'a>>,
-    /// Of the translation, not widened for the chance that the stone is loose.
+    /// Covariance of the translation, not widened for the chance that the stone is loose.
     translation: Matrix3<f64>,
-    /// Of the shortest octave of the errors that its points share.
+    /// Covariance of the shortest octave of the errors that its points share.
     octave: Matrix3<f64>,
     least_photo_error: Matrix3<f64>,
-    /// Of what errors of the poses cause.
+    /// Covariance that errors of the poses cause.
     of_poses: Matrix3<f64>,
 }
 

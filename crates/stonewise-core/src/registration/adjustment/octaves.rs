@@ -15,10 +15,10 @@ const PRIOR_STONES: f64 = 6.0;
 
 /// Errors that points share beyond what the cells of a stone show, in the frame of any stone.
 ///
-/// How large an octave is follows from heights, and so from errors out of the face. Errors of a cloud that was computed from photos lie along its rays, so that those in the face are much smaller, and
-/// what photos measure takes little part in them. How much smaller, the motions themselves show: whatever stones
-/// do, their motions scatter at least as much as their errors. The variances on each axis are therefore no
-/// larger than the motions allow.
+/// How large an octave is follows from heights, and so from errors out of the face. Errors of a cloud that was computed
+/// from photos lie along its rays, so that those in the face are much smaller, and what photos measure takes little
+/// part in them. How much smaller, the motions themselves show: whatever stones do, their motions scatter at least as
+/// much as their errors. The variances on each axis are therefore no larger than the motions allow.
 pub(super) struct Octaves {
     /// Variance of one octave on any axis as heights show it, m^2.
     expected_m2: f64,
@@ -40,7 +40,7 @@ pub(super) struct Shown {
 }
 
 impl Octaves {
-    /// As heights alone show them: alike on all axes.
+    /// The octaves that heights alone show: alike on all axes.
     fn expected(adjustment: &Adjustment) -> Self {
         let one = adjustment.shared_variances(1.0);
         Self {
@@ -51,7 +51,7 @@ impl Octaves {
         }
     }
 
-    /// As large as the motions of stones that are not loose allow. `displacement`: of a stone in its frame.
+    /// The octaves as large as the motions of stones that are not loose allow. `displacement`: of a stone in its frame.
     pub fn of(adjustment: &Adjustment, displacement: impl Fn(usize) -> Option<Vector3<f64>>) -> Self {
         let expected = Self::expected(adjustment);
         let motion = |i: usize| {

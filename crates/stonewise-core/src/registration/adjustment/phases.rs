@@ -38,7 +38,7 @@ impl<'a, S: PairSource> Surveyed<'a, S> {
         self.0.stones() == 0
     }
 
-    /// What there is to say of no stones.
+    /// The report where there are no stones.
     pub fn report(&self) -> AdjustmentReport {
         self.0.report(true)
     }
@@ -150,7 +150,7 @@ impl<'a, S: PairSource> Settled<'a, S> {
         self.converged && self.run.loosen_zone(MAX_ZONES)
     }
 
-    /// As [`Tracked::weigh`], now that the wall is parted or a zone is loose.
+    /// Weighs as [`Tracked::weigh`] does, now that the wall is parted or a zone is loose.
     pub fn weigh(self) -> Phase<Weighed<'a, S>, S> {
         Tracked(self.run).weigh()
     }

@@ -100,8 +100,8 @@ impl Adjustment {
         self.stones[i].on_own = None;
     }
 
-    /// Those of some places that in the face lie beyond the reach of a stone's relief, in its frame; out of the
-    /// face, and in its rotation, the stone stays as it is.
+    /// Motions to some places that in the face lie beyond the reach of a stone's relief, in its frame; out of the face,
+    /// and in its rotation, the stone stays as it is.
     fn elsewhere(&self, i: usize, places: [Vector3<f64>; 2]) -> Vec<StoneVector> {
         let frame = &self.prior.graph.nodes[i].face_from_world;
         let here = self.stones[i].with_field.motion;

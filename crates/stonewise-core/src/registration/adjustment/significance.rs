@@ -92,7 +92,7 @@ fn with_free_bending(equations: &NormalEquations) -> NormalEquations {
     }
 }
 
-/// As many stones, in the order of their probability of an error, as keep the mean of that probability within
+/// Selects as many stones, in the order of their probability of an error, as keep the mean of that probability within
 /// `rate` (Newton et al. 2004). `None`: not a candidate.
 fn within_error_rate(p_error: &[Option<f64>], rate: f64) -> Vec<bool> {
     let mut candidates: Vec<(f64, usize)> = p_error

@@ -29,7 +29,7 @@ impl StoneVector {
         Self(all)
     }
 
-    /// Of the centroid: along, up, out, metres.
+    /// Translation of the centroid: along, up, out, metres.
     pub fn translation(&self) -> Vector3<f64> {
         self.0.fixed_rows::<3>(0).into_owned()
     }

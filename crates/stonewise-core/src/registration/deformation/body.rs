@@ -235,7 +235,7 @@ fn add_octaves(shared: &mut SharedErrors, motions: &JointMotions, stones: &[Body
 pub(super) struct Covariance<'a> {
     body: &'a Body<'a>,
     factor: BlockFactor<'a, 9>,
-    /// Of each stone, m^2.
+    /// Covariance of each stone, m^2.
     pub diagonal: Vec<Matrix3<f64>>,
 }
 

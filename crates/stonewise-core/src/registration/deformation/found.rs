@@ -15,7 +15,7 @@ pub(super) const OUTSIDE: f64 = 0.05;
 /// How the wall deformed between two epochs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Deformation {
-    /// Of each measured stone whose part of the wall has stones enough, ascending.
+    /// Deformation of each measured stone whose part of the wall has stones enough, ascending.
     pub stones: Vec<StoneDeformation>,
     /// Probability of so large a deformation by chance; `None` where no part of the wall has stones enough.
     pub p: Option<f64>,

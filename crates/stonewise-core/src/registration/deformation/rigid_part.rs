@@ -101,7 +101,7 @@ struct Fit<'a> {
 }
 
 impl Fit<'_> {
-    /// With how much of its weight each stone counts.
+    /// Share of its weight with which each stone counts.
     fn shares(&self, of: impl Fn(usize) -> f64) -> Vec<f64> {
         let mut shares = vec![0.0; self.body.stones.len()];
         self.firm.iter().for_each(|&i| shares[i] = of(i));

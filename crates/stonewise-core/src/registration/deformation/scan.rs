@@ -20,7 +20,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Simulations of a wall that moved as one rigid body.
 const SIMULATIONS: usize = 999;
-/// A bulge of which a rigid motion explains all but this share of the information is none.
+/// A bulge does not count if a rigid motion explains all but this share of its information.
 const LEAST_SHARE: f64 = 0.02;
 /// Standard deviations by which a bulge must exceed the limit of the test to be found in 95 of 100 cases.
 const POWER: f64 = 1.645;
@@ -63,8 +63,8 @@ pub(super) struct Bulge {
     diameter_m: f64,
     /// Stones and by how much of the amplitude they move.
     pub stones: Vec<(usize, f64)>,
-    /// Of each direction: standard deviation of the score, and information on the amplitude; `None` where nothing
-    /// shows it.
+    /// Standard deviation of the score, and information on the amplitude, in each direction; `None` where nothing shows
+    /// it.
     pub directions: [Option<(f64, f64)>; 3],
 }
 
@@ -174,7 +174,7 @@ struct Model<'a> {
     inverse: Matrix6<f64>,
     /// Unknowns of shared errors times what the rigid motion takes up of them.
     of_shared: OMatrix<f64, Dyn, Const<6>>,
-    /// Of each stone: the inverse covariance of what its observations give.
+    /// Inverse covariance of what the observations of each stone give.
     weights: Vec<Matrix3<f64>>,
 }
 

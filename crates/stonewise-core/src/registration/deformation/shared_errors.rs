@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Dyn, Matrix3, OMatrix, Vector3};
 
 /// Errors of the stones as linear functions of unknowns that are normal about zero: e_i = L_i u.
 pub(super) struct SharedErrors {
-    /// Of each stone: unknowns, and the displacement by each of them, metres a unit.
+    /// Unknowns of each stone, and its displacement by each of them, metres a unit.
     rows: Vec<Vec<(usize, Vector3<f64>)>>,
     /// First unknown and covariance of each independent group.
     groups: Vec<(usize, Spread)>,

@@ -1,11 +1,12 @@
 //! What the motions may have smoothed: an average over all bulges.
 //!
 //! The field of motions smooths a zone that moves more than the rest of the wall, and its covariance does not allow for
-//! that. What the observations show of a bulge beyond the motions says how much may be missing. The amplitude of each bulge in each
-//! direction has a normal prior about zero, with the variance that makes the observations most likely: with z, what is
-//! missing in standard deviations, and |z| > 1, the Bayes factor is exp((z^2 - 1) / 2) / |z| (Edwards, Lindman & Savage
-//! 1963) and the mean square of the amplitude is z^2 - 1 times its variance. In advance, it is as probable that none is
-//! missing as that one of them is. The covariances are averages over all of them (Hoeting et al. 1999).
+//! that. What the observations show of a bulge beyond the motions says how much may be missing. The amplitude of each
+//! bulge in each direction has a normal prior about zero, with the variance that makes the observations most likely:
+//! with z, what is missing in standard deviations, and |z| > 1, the Bayes factor is exp((z^2 - 1) / 2) / |z| (Edwards,
+//! Lindman & Savage 1963) and the mean square of the amplitude is z^2 - 1 times its variance. In advance, it is as
+//! probable that none is missing as that one of them is. The covariances are averages over all of them (Hoeting et al.
+//! 1999).
 
 use super::body::Body;
 use super::scan::Bulge;

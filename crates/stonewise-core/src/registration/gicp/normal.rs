@@ -21,7 +21,7 @@ pub(super) struct PlaneFit {
     needed: usize,
     /// Points within this radius take part too, metres.
     radius_m: f64,
-    /// Of the first search, metres.
+    /// Radius of the first search, metres.
     first_m: f64,
 }
 

@@ -20,28 +20,28 @@ pub(super) struct Model {
     /// Covariance of the error of the later epoch as a whole where it is left open, so that areas alone determine it,
     /// m^2.
     pub open: Matrix3<f64>,
-    /// Of a source on a plane of a stable area, metres.
+    /// Standard deviation of a source's error on a plane of a stable area, metres.
     pub plane_m: f64,
     pub class: SensorClass,
 }
 
 impl Model {
-    /// With all errors of the sources times `factor`.
+    /// The assumptions with all errors of the sources times `factor`.
     pub fn scaled(&self, factor: f64) -> (Prior, ObserverComponents) {
         let components = self.components.scaled(factor);
         let prior = Prior::with_planes(&components, self.whole, self.plane_m);
         (prior, components)
     }
 
-    /// With an error of the whole epoch so wide that areas alone determine it.
+    /// The assumptions with an error of the whole epoch so wide that areas alone determine it.
     pub fn opened(&self) -> (Prior, ObserverComponents) {
         let prior = Prior::with_planes(&self.components, self.open, self.plane_m);
         (prior, self.components)
     }
 
-    /// With the error of the whole epoch as large as stable areas show it, where that is far more than is assumed: an
-    /// assumption that does not hold would pull the error towards none. Along what the areas show worse than it is
-    /// assumed, the assumption holds: no area makes the expected error larger.
+    /// The model with the error of the whole epoch as large as stable areas show it, where that is far more than is
+    /// assumed: an assumption that does not hold would pull the error towards none. Along what the areas show worse
+    /// than it is assumed, the assumption holds: no area makes the expected error larger.
     pub fn widened(self, unknowns: &Unknowns, observations: &[&Observation]) -> Self {
         let (prior, components) = self.opened();
         let Some(solution) = Problem::new(unknowns, observations).solve(&prior, &components) else {
@@ -55,7 +55,7 @@ impl Model {
         self.widened_to(&shown, &covariance)
     }
 
-    /// With an error of the whole epoch that was found with this covariance, left open.
+    /// The model with an error of the whole epoch that was found with this covariance, left open.
     fn widened_to(self, shown: &Vector3<f64>, covariance: &Matrix3<f64>) -> Self {
         let eigen = (0.5 * (covariance + covariance.transpose())).symmetric_eigen();
         let (mut seen, mut surprise) = (Vector3::zeros(), 0.0);

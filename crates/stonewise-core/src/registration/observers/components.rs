@@ -5,17 +5,17 @@ use serde::{Deserialize, Serialize};
 /// Standard deviations of the sources' errors and of what compares them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ObserverComponents {
-    /// Of a source's translation, per axis, metres.
+    /// Standard deviation of a source's translation, per axis, metres.
     pub translation_m: f64,
-    /// Of its rotation, per axis, as a displacement at the root mean square distance of what it sees from its
-    /// middle, metres.
+    /// Standard deviation of its rotation, per axis, as a displacement at the root mean square distance of what it sees
+    /// from its middle, metres.
     pub rotation_m: f64,
-    /// Of its drift, per axis, metres.
+    /// Standard deviation of its drift, per axis, metres.
     pub drift_m: f64,
     /// Correlation length of the drift, as a share of the source's duration.
     pub drift_length: f64,
-    /// Of an independent error of each source at each stone (incidence, footprint), in the face and across
-    /// it, metres.
+    /// Standard deviations of an independent error of each source at each stone (incidence, footprint), in the face and
+    /// across it, metres.
     pub nugget_m: [f64; 2],
     /// Factor on the variances that the points' noise gives differences of sources.
     pub noise_scale: f64,
@@ -107,9 +107,9 @@ impl SensorClass {
 /// Standard deviations of a relative stretch, in the face, of what a source shows about its middle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stretch {
-    /// Of what all sources of both epochs share.
+    /// Standard deviation of the stretch that all sources of both epochs share.
     pub shared: f64,
-    /// Of what the sources of one epoch share.
+    /// Standard deviation of the stretch that the sources of one epoch share.
     pub of_epoch: f64,
 }
 

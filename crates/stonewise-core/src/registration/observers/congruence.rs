@@ -64,7 +64,7 @@ pub(super) fn reweighted(
     weighted.collect()
 }
 
-/// Of the groups of cells, the one that moved most significantly, if any did; the only one there is never.
+/// The group of cells that moved most significantly, if any did; never the only one there is.
 fn most_moved<G: Ord + Copy>(
     unknowns: &Unknowns,
     within: &[&Observation],

@@ -275,7 +275,7 @@ fn common_shifts(
     let mut sums: BTreeMap<(usize, usize), Translation> = BTreeMap::new();
 
     for (key, term) in found.into_iter().flatten() {
-        // The same two sources the other way round say the same with the other sign.
+        // Two sources the other way round give the same term with the other sign.
         let (key, sign) = if key.0 < key.1 {
             (key, 1.0)
         } else {

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 /// independent from stone to stone. World, metres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointErrors {
-    /// Of each stone: coefficients of three unknowns each, by the first of them.
+    /// Coefficients of each stone: of three unknowns each, by the first of them.
     pub(crate) rows: Vec<Row>,
     /// Covariance of the unknowns; second moments where the error is not taken off the motions.
     pub(crate) covariance: DMatrix<f64>,

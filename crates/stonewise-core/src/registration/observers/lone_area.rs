@@ -26,8 +26,8 @@ pub struct LoneArea {
 
 impl LoneArea {
     /// The area that departs most from what everything else says of the error, if it departs by more than four standard
-    /// deviations. With the area as the only witness, nobody can tell an error of the registration from a motion of
-    /// the area.
+    /// deviations. With the area as the only evidence, an error of the registration cannot be distinguished from a
+    /// motion of the area.
     ///
     /// `model`: with the error that is assumed of the epoch; `found`: the error with all areas.
     pub(super) fn among(

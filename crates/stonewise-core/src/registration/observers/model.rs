@@ -66,7 +66,7 @@ pub(super) struct Prior {
     pub drift_length: f64,
     /// Covariance of the error of the later epoch against the reference, as a whole, m^2; 0: none.
     pub whole: Matrix3<f64>,
-    /// Of a source on a plane of the stable areas.
+    /// Standard deviation of a source's error on a plane of the stable areas, metres.
     pub plane_m: f64,
     /// Drift of an epoch whose files keep no sources apart, along the wall; `None`: that of a source.
     pub merged: Option<MergedDrift>,

@@ -17,7 +17,7 @@ pub(super) struct RelativeErrors {
     pub merged_error_m: Option<f64>,
     /// At each stone, world, m^2.
     pub at: Vec<Matrix3<f64>>,
-    /// Of the difference between two neighbours, world, m^2.
+    /// Covariance of the difference between two neighbours, world, m^2.
     pub between: Vec<Matrix3<f64>>,
     /// The error at all stones together, the rigid motion not taken off.
     pub joint: Option<JointErrors>,

@@ -68,8 +68,8 @@ pub struct StablePoints {
     pub times_s: Vec<f64>,
 }
 
-/// Factor by which noise along the normal may exceed that of the wall's points, and roughness of a plane,
-/// metres. What scatters more is a shrub or an edge, and its mean plane depends on who looks at it.
+/// Factor by which noise along the normal may exceed that of the wall's points, and roughness of a plane, metres. What
+/// scatters more is a shrub or an edge, and its mean plane depends on the source that measures it.
 const NOISE_SLACK: f64 = 1.5;
 const ROUGHNESS_M: f64 = 0.01;
 /// Points farther from their plane than this many median absolute deviations are left out.
@@ -342,8 +342,8 @@ fn shows_plane(points: &[CellPoint], source: usize, normal: &Vector3<f64>, param
     })
 }
 
-/// Mean normal of the cells around that lie in the same plane: a single cell's tilts with the noise of its
-/// points, and would then show displacements along the plane that nobody can see.
+/// Mean normal of the cells around that lie in the same plane: a single cell's tilts with the noise of its points, and
+/// would then show displacements along the plane that are not observable.
 fn mean_normal(plane: &CellPlane, planes: &[(usize, CellPlane)], params: &StableParams) -> Vector3<f64> {
     let reach = NORMAL_REACH * params.cell_m;
     let sum: Vector3<f64> = planes

@@ -104,7 +104,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Those of a range that lie on the grid after a shift.
+/// The indices of a range that lie on the grid after a shift.
 fn shifted(range: &Range<usize>, shift: isize, size: usize) -> Range<usize> {
     let least = 0usize.saturating_add_signed(-shift);
     let most = size.saturating_add_signed(-shift);

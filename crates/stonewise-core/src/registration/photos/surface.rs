@@ -36,7 +36,7 @@ pub(crate) struct Surface {
 }
 
 impl Surface {
-    /// Of the points of the first epoch; `face_from_world`: the stone's frame. `None` where nothing of the
+    /// The surface of the points of the first epoch; `face_from_world`: the stone's frame. `None` where nothing of the
     /// face is left within the rim.
     pub fn new(
         pair: &PairPoints,

@@ -16,11 +16,11 @@ use nalgebra::Vector3;
 /// The points of a stone, chosen from all points near it, and the window in which they count.
 #[derive(Clone, Debug)]
 pub struct StonePoints {
-    /// Of the first epoch: those in the window.
+    /// Points of the first epoch in the window.
     pub first: Vec<[f32; 3]>,
-    /// Of the second epoch: those with the label, in or out of the window, which moves with the stone.
+    /// Points of the second epoch with the label, in or out of the window, which moves with the stone.
     pub second: Vec<[f32; 3]>,
-    /// Of the second epoch: those without the label that may lie in the window.
+    /// Points of the second epoch without the label that may lie in the window.
     pub nearby_second: Vec<[f32; 3]>,
     /// `None`: all points count.
     pub window: Option<Window>,

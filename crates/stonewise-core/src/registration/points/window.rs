@@ -8,7 +8,8 @@ use std::collections::BTreeSet;
 /// Share of a stone's points, at either end of their depths, that does not set how deep the stone reaches:
 /// mixed pixels and what hangs in front of the stone.
 const DEPTH_TAIL: f64 = 0.02;
-/// Noise levels of an epoch by which the depth of a stone is widened for its points: normal noise exceeds it in three points in 100,000 on either side.
+/// Noise levels of an epoch by which the depth of a stone is widened for its points: normal noise exceeds it in three
+/// points in 100,000 on either side.
 const DEPTH_NOISES: f64 = 4.0;
 /// How much farther than its neighbours' shift a stone may be followed into points without its label, metres:
 /// twice the typical motion of a loose stone.

@@ -16,8 +16,8 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct EditReport {
     /// What each edit did, in their order.
     pub effects: Vec<Result<EditEffect, NoEffect>>,
-    /// Of every stone that edits made or changed: the stones as labelled whose points it has. Stones that are
-    /// gone are not among them.
+    /// The stones as labelled whose points each stone has that edits made or changed. Stones that are gone are not
+    /// among them.
     pub origins: BTreeMap<u32, BTreeSet<u32>>,
     /// Stones as labelled that are gone.
     pub gone: BTreeSet<u32>,

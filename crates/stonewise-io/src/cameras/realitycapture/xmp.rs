@@ -11,7 +11,7 @@ use std::path::Path;
 use stonewise_core::geometry::{Rigid3, View};
 use stonewise_core::id::ImageId;
 
-/// By it the sidecars of other programs are told apart.
+/// Namespace that distinguishes these sidecars from those of other programs.
 const NAMESPACE: &str = "http://www.capturingreality.com/ns/xcr/";
 
 /// Whether sidecars of RealityCapture lie in a folder itself.

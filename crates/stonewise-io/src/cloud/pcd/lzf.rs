@@ -74,7 +74,7 @@ impl<R: Read> Lzf<R> {
         Ok(byte)
     }
 
-    /// Unpacks bytes that nobody needs.
+    /// Unpacks this number of bytes and drops them.
     pub fn skip(&mut self, bytes: u64) -> io::Result<()> {
         (0..bytes).try_for_each(|_| self.unpack().map(drop))
     }

@@ -141,7 +141,7 @@ impl Values {
         self.next_with_items(path, element, row, &mut |_, _| {})
     }
 
-    /// As `next`, and passes (place of the property, item) for every item of every list.
+    /// Reads on as `next` does, and passes (place of the property, item) for every item of every list.
     pub(super) fn next_with_items(
         &mut self,
         path: &Path,

@@ -21,7 +21,7 @@ pub struct Filters {
 }
 
 impl Filters {
-    /// Of weights [outputs, inputs, 3, 3]: F(4 x 4, 3 x 3) of Lavin & Gray 2016, section 4.2.
+    /// The filters of weights [outputs, inputs, 3, 3]: F(4 x 4, 3 x 3) of Lavin & Gray 2016, section 4.2.
     pub fn new(weights: &[f32]) -> Self {
         let count = weights.len() / (SIZE * SIZE);
         let mut values = vec![0.0f32; PLACES * count];

@@ -106,7 +106,7 @@ impl Dirt {
 #[derive(Clone, Copy, Default)]
 struct Covered {
     all: u32,
-    /// Of these, under moss or lichen.
+    /// Samples under moss or lichen.
     hidden: u32,
 }
 

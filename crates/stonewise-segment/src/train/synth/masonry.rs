@@ -100,9 +100,9 @@ impl Masonry {
 /// Samples of the canvas that belong to a stone.
 #[derive(Clone, Copy, Default)]
 struct Area {
-    /// In its cell.
+    /// Samples in its cell.
     cell: u32,
-    /// Of these, not covered by mortar.
+    /// Samples in its cell that mortar does not cover.
     open: u32,
 }
 

@@ -33,7 +33,8 @@ impl MasonryStyle {
         Self::drawn(seed, width, height, false)
     }
 
-    /// As [`Self::random`], with the walls laid dry: mostly small rubble without mortar, between dark, deep gaps.
+    /// A random style, as [`Self::random`] draws it, with the walls laid dry: mostly small rubble without mortar,
+    /// between dark, deep gaps.
     pub fn dry(seed: u64, width: u32, height: u32) -> Self {
         Self::drawn(seed, width, height, true)
     }

@@ -59,7 +59,7 @@ impl Viewpoint {
 pub(super) struct View {
     wall_from_photo: Matrix3<f32>,
     photo_from_wall: Matrix3<f32>,
-    /// Of `wall_from_photo`.
+    /// Determinant of `wall_from_photo`.
     determinant: f32,
     middle: [f32; 2],
     /// Distortion per squared pixel.

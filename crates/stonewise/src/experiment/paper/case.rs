@@ -10,9 +10,9 @@ use stonewise_core::matching::MatchParams;
 /// How the stones are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Method {
-    /// With the settings of the project.
+    /// The method with the settings of the project.
     Ours,
-    /// With the paper's matching and its estimator.
+    /// The paper's matching and its estimator.
     Paper,
 }
 

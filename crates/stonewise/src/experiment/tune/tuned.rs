@@ -21,9 +21,9 @@ pub struct TunedPoint {
     pub values: Vec<toml::Value>,
     /// Stones of the first epoch.
     pub stones: f64,
-    /// Of them, matched; mean over the motions.
+    /// Stones of the first epoch that were matched; mean over the motions.
     pub matched: f64,
-    /// Of them, measured; mean over the motions.
+    /// Stones of the first epoch that were measured; mean over the motions.
     pub measured: f64,
     /// Errors of the measured stones; `None` where there are none.
     pub errors: Option<PointErrors>,

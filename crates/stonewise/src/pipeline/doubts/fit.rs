@@ -60,7 +60,7 @@ impl Fit {
         [("found", self.found), ("sought", self.sought)].map(|(name, n)| (name, n.to_string().into()))
     }
 
-    /// Of numbers that a test chooses.
+    /// The fit of numbers that a test chooses.
     #[cfg(test)]
     pub const fn of_counts(found: usize, sought: usize) -> Self {
         Self { found, sought }

@@ -1,8 +1,8 @@
 //! Stones that one view shows and nothing confirms.
 //!
 //! The vote in one epoch keeps a stone that one of five views shows, because the detector misses stones. Where no other
-//! epoch shows it better, it is none: a stain, a part of a stone, or ground and shrubs beside the wall, which the
-//! detector takes for the same stone in every epoch. Their surface is smooth, so that they seem to slide.
+//! epoch shows it better, it is not a stone: a stain, a part of a stone, or ground and shrubs beside the wall, which
+//! the detector takes for the same stone in every epoch. Their surface is smooth, so that they seem to slide.
 
 use super::carry::CARRY;
 use super::label::{DiskLabels, Labelled, Labels, tabulate};

@@ -215,7 +215,7 @@ fn use_of(found: &Agreement) -> DatumUse {
     }
 }
 
-/// Says who disagrees, who is left out, and what becomes of those in use.
+/// Notes which instruments disagree, which are left out, and what becomes of those in use.
 pub fn note_instruments(context: &Context, record: &InstrumentsEpoch) {
     let names = |names: Vec<&str>| Said::from(names.join(", "));
     let left_out: Vec<&str> = record.left_out.iter().map(|l| l.name.as_str()).collect();

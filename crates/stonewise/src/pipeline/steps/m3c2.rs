@@ -129,7 +129,7 @@ struct Comparison<'a> {
 }
 
 impl<'a> Comparison<'a> {
-    /// That of a later epoch with the reference.
+    /// The comparison of a later epoch with the reference.
     fn new(
         context: &'a Context<'a>,
         epochs: Pair<&'a Ingested>,

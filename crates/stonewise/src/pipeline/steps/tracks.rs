@@ -52,7 +52,7 @@ pub struct Tracked {
 
 /// A stone that the reference does not show.
 pub struct TrackedStone {
-    /// As the first epoch shows it that shows it, with a number of its own.
+    /// The stone in the first epoch that shows it, with a number of its own.
     pub stone: Stone,
     /// That epoch.
     pub since: EpochId,

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 pub(crate) struct FieldVector(Vector9);
 
 impl FieldVector {
-    /// Of the stone's centroid, metres.
+    /// Displacement of the stone's centroid, metres.
     pub fn displacement(&self) -> Vector3<f64> {
         self.0.fixed_rows::<3>(0).into_owned()
     }

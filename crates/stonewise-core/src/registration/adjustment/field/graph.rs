@@ -31,7 +31,7 @@ pub(crate) struct Edge {
 pub(crate) struct Graph {
     pub nodes: Vec<Node>,
     pub edges: Vec<Edge>,
-    /// Of the equations of the field: nine unknowns a node.
+    /// Sparsity pattern of the equations of the field: nine unknowns a node.
     pub pattern: BlockPattern<9>,
 }
 

@@ -13,7 +13,7 @@ pub(crate) struct MotionPrior {
     pub graph: Graph,
     /// One per edge of the graph.
     pub ties: Vec<Tie>,
-    /// Of zones that creep, one per node of the graph.
+    /// The least change of the motion in zones that creep, one per node of the graph.
     pub least: Vec<Least>,
     pub components: VarianceComponents,
     pub loose: LoosePrior,
@@ -52,7 +52,7 @@ impl MotionPrior {
         self.components.own_variances()
     }
 
-    /// Those that a loose stone makes.
+    /// Variances of the motion that a loose stone makes on its own.
     pub fn loose_variances(&self) -> [f64; 9] {
         self.loose.own_variances(&self.components)
     }

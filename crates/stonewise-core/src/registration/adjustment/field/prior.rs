@@ -19,7 +19,7 @@ pub(crate) struct Tie {
 }
 
 impl Tie {
-    /// Of neighbours between which nothing is broken.
+    /// The tie of neighbours between which nothing is broken.
     pub const WHOLE: Self = Self {
         weight: 1.0,
         is_parted: false,

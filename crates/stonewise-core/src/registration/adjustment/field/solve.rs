@@ -33,7 +33,8 @@ pub(crate) struct Normal<'a> {
     pub eliminated: Vec<Eliminated>,
 }
 
-/// Of stones that do beside the field what the problem's components and loose prior say.
+/// The normal equations of the field, where the motions of stones beside it are as the problem's components and loose
+/// prior say.
 pub(crate) fn normal_equations<'a>(problem: &FieldProblem<'a>) -> Option<Normal<'a>> {
     let eliminated = eliminate_own_motions(problem, &problem.own_variances());
     let prior = prior(problem.graph, &problem.components, &problem.ties, &problem.least);

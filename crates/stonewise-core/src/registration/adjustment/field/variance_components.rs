@@ -128,7 +128,7 @@ impl VarianceComponents {
         [i, i, o, r, r, r, b, b, b].map(|s| s * s)
     }
 
-    /// Such variances with the error in the face.
+    /// Adds the variance of the error in the face to such variances.
     pub(crate) fn with_error(&self, mut variances: [f64; 9]) -> [f64; 9] {
         for v in &mut variances[..2] {
             *v += self.error_m * self.error_m;
@@ -137,7 +137,7 @@ impl VarianceComponents {
     }
 }
 
-/// As good as no motion, metres: a hundredth of the best accuracy of a stone.
+/// Standard deviation that counts as no motion, metres: a hundredth of the best accuracy of a stone.
 const NONE_M: f64 = 2e-6;
 
 /// A component counts as lying at a bound if their logarithms differ by less than this (rounding).

@@ -53,8 +53,8 @@ impl LikelihoodRatioTest<'_> {
         }
     }
 
-    /// Of the half that favours the stone's own motion least: cut either way through the middle of the first
-    /// epoch's points.
+    /// The least log likelihood ratio over the halves of the stone, cut either way through the middle of the first
+    /// epoch's points: that of the half that favours the stone's own motion least.
     fn least_half(&self) -> f64 {
         let [u, v] = [0, 1].map(|axis| {
             let mut places: Vec<f64> = self.pair.first.iter().map(|p| p[axis]).collect();

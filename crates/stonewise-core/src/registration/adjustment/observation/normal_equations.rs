@@ -21,7 +21,7 @@ pub(crate) struct NormalEquations {
 }
 
 impl NormalEquations {
-    /// Of a stone that nothing observes.
+    /// The equations of a stone that nothing observes.
     pub fn nothing() -> Self {
         Self {
             information: Matrix9::zeros(),

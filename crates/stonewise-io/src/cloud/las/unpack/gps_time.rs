@@ -26,7 +26,7 @@ const OTHERS: u32 = 4;
 /// step.
 const MOST_EXTREMES: u32 = 3;
 
-/// How the corrections of a difference are told apart: the contexts of its coder.
+/// The contexts of the coder of a difference, which distinguish its corrections.
 mod correction {
     pub const FIRST: u32 = 0;
     pub const SAME: u32 = 1;

@@ -22,7 +22,7 @@ use stonewise_segment::Weights;
 /// Points of stones this far from the ray of a pixel say where the face is, metres: the neighbourhood in
 /// which a stone's normal is found.
 const REACH_M: f64 = 0.75;
-/// Of points in a cube of this edge the first counts, metres, so that dense clouds do not crowd out the
+/// Edge of the cubes of which only the first point counts, metres, so that dense clouds do not crowd out the
 /// neighbourhood.
 const THIN_M: f64 = 0.05;
 /// Nearest points to which the face is fitted: about three stones.

@@ -15,7 +15,7 @@ pub struct DiskLabels {
 }
 
 impl DiskLabels {
-    /// Those in a folder.
+    /// The labels of tiles in a folder.
     pub fn new(dir: &Path, tiles: &DiskTiles) -> Self {
         let file = |tile| dir.join(Self::file_name(tiles, tile));
         Self {

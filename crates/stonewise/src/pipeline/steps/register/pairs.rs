@@ -69,7 +69,7 @@ impl DiskPairs {
         self.batches[batch].iter().map(|p| p.shift).collect()
     }
 
-    /// Removes the files: once the motions are known nobody needs them.
+    /// Removes the files, which are not needed once the motions are known.
     pub fn remove(self) -> Result<()> {
         (0..self.batches.len()).try_for_each(|batch| {
             let path = self.file(batch);

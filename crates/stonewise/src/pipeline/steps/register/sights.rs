@@ -25,7 +25,7 @@ const STABLE_POINTS: u32 = 40;
 
 /// The sources of two epochs and what they show.
 pub struct Sights {
-    /// Those of the reference epoch, then those of the later one.
+    /// Sources of the reference epoch, then those of the later one.
     pub sources: Vec<Source>,
     /// Number of sources of an epoch that count as one, because they are too many.
     pub too_many: [Option<usize>; 2],

@@ -22,7 +22,7 @@ pub(crate) struct BiasWeights {
 }
 
 impl BiasWeights {
-    /// Of a bias as large as is expected.
+    /// The weights of a bias as large as is expected.
     pub const USUAL: Self = Self {
         with_field: 1.0,
         on_own: 1.0,

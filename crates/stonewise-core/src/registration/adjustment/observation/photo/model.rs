@@ -94,7 +94,7 @@ pub struct StonePhotoReport {
 }
 
 impl PhotoModel {
-    /// Of tracked stones, before the poses are adjusted.
+    /// The model of tracked stones, before the poses are adjusted.
     pub fn new(params: PhotoParams, photos: &[Photo], stones: &[StoneInPhotos], tracks: Vec<Track>) -> Self {
         let centres: Vec<Point3<f64>> = photos.iter().map(|p| p.camera.centre()).collect();
         let scales = (0..photos.len())

@@ -33,7 +33,7 @@ pub(crate) struct Correlation {
 }
 
 impl Correlation {
-    /// Of independent noise.
+    /// The factors of independent noise.
     pub const NONE: Self = Self {
         small: 1.0,
         large: 1.0,

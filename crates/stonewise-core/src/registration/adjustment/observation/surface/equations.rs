@@ -43,7 +43,7 @@ pub(crate) struct Equations {
 }
 
 impl Equations {
-    /// Of no points; `overlap` as in the struct.
+    /// The equations of no points; `overlap` as in the struct.
     pub(super) fn zeros(overlap: f64) -> Self {
         Self {
             information: Matrix9::zeros(),

@@ -23,7 +23,7 @@ pub(crate) struct Linearisation {
 }
 
 impl Linearisation {
-    /// Of a stone at this motion, not yet evaluated.
+    /// The linearisation of a stone at this motion, not yet evaluated.
     pub fn new(motion: StoneVector) -> Self {
         Self {
             window: motion,

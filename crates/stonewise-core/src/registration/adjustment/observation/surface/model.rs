@@ -36,12 +36,12 @@ pub(crate) struct StoneSurface<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Inflation {
     pub all: f64,
-    /// Of the motion in the face; counts where it is larger.
+    /// Factor for the motion in the face; counts where it is larger.
     pub in_face: f64,
 }
 
 impl SurfaceModel {
-    /// Of points with independent noise of 3 mm on stones with a roughness of 1 mm over a cell: the estimate
+    /// The model of points with independent noise of 3 mm on stones with a roughness of 1 mm over a cell: the estimate
     /// starts there.
     pub fn start(layout: Layout) -> Self {
         Self {

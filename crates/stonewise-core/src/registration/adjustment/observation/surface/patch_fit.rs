@@ -223,7 +223,7 @@ mod tests {
         }
     }
 
-    /// That of the grid, repeated here so that a change shows.
+    /// The ridge of the grid, repeated here so that a change shows.
     const RIDGE_OF_GRID: f64 = 1e-8;
 
     #[test]

@@ -185,7 +185,7 @@ impl PatchGrid {
 /// Adds what points of an epoch say to the normal equations of the coefficients.
 struct Observations<'a> {
     points: &'a [WeightedPoint],
-    /// Of a point of full weight, m^2.
+    /// Variance of a point of full weight, m^2.
     variance: f64,
     matrix: &'a mut Band,
     rhs: &'a mut [[f64; 1]],
@@ -208,7 +208,7 @@ impl WithSimd for Observations<'_> {
 fn add_observation(point: &WeightedPoint, weight: f64, matrix: &mut Band, rhs: &mut [[f64; 1]]) {
     let [short, long] = point.basis.value;
     let products: [[f64; 4]; 4] = from_fn(|b| from_fn(|d| weight * short[b] * short[d]));
-    // The same from the diagonal on, as columns of the lower triangle hold them.
+    // The products from the diagonal on, as columns of the lower triangle hold them.
     let below: [[f64; 4]; 4] = from_fn(|b| from_fn(|k| products[b].get(b + k).copied().unwrap_or(0.0)));
     for a in 0..4 {
         let row = point.basis.row(a);

@@ -12,14 +12,14 @@ pub(crate) struct SurfaceNoise {
 /// How a stone's noise departs from that of most stones, as factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct NoiseFactors {
-    /// Of the points, per epoch.
+    /// Factors on the noise of the points, per epoch.
     pub points: [f64; 2],
-    /// Of the surface's roughness.
+    /// Factor on the surface's roughness.
     pub roughness: f64,
 }
 
 impl NoiseFactors {
-    /// Those of most stones.
+    /// The factors of most stones.
     pub const USUAL: Self = Self {
         points: [1.0; 2],
         roughness: 1.0,
@@ -35,7 +35,7 @@ impl SurfaceNoise {
         }
     }
 
-    /// With the roughness of a surface, as a factor.
+    /// The noise on a surface whose roughness is this factor times the usual one.
     pub fn on_surface(&self, roughness: f64) -> Self {
         Self {
             tau_m: roughness * self.tau_m,
