@@ -11,7 +11,7 @@ export function fixed(value: number, decimals: number): string {
   return sign + text.replace(".", DECIMAL);
 }
 
-/** The same with a plus sign before positive values. */
+/** A number with a fixed number of decimals, and a plus sign before positive values. */
 export function signed(value: number, decimals: number): string {
   return value > 0 && Number(value.toFixed(decimals)) !== 0 ? `+${fixed(value, decimals)}` : fixed(value, decimals);
 }

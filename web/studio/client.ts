@@ -71,7 +71,7 @@ export function newId(): string {
 
 export type Watcher = (state: State) => void;
 
-/** The server's state, told to all who watch. */
+/** The server's state, passed to all watchers. */
 export class Live {
   #state: State | null = null;
   readonly #watchers = new Set<Watcher>();
@@ -87,7 +87,7 @@ export class Live {
     source.addEventListener("error", () => this.#lost(true));
   }
 
-  /** The state as it was told last. */
+  /** The state that the server sent last. */
   get state(): State | null {
     return this.#state;
   }

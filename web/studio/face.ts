@@ -291,7 +291,7 @@ export class Face {
     this.redraw();
   }
 
-  /** Adds a vertex; one that lies where the last one does is none. */
+  /** Adds a vertex, unless it lies where the last one does. */
   #vertex(place: Point): void {
     const points = this.#drawing!.points, last = points.at(-1);
     const near = 2 / this.#view.scale;

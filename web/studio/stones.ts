@@ -18,9 +18,9 @@ import { type Word, tx } from "./texts.ts";
 
 /** A stone whose points get less than this share of the photos' votes is worth a look. */
 const AGREEMENT = 0.7;
-/** So much larger or smaller than the median of the stones around it is worth a look. */
+/** A stone this many times larger or smaller than the median of the stones around it is worth a look. */
 const UNLIKE = 5;
-/** Stones are around one another within so many edges of the median stone of the wall. */
+/** Stones within this many edges of the median stone of the wall are around one another. */
 const AROUND = 4;
 /** How far a stable area reaches in front of the surface and behind it, metres, unless somebody says otherwise. */
 const MARGIN_M = "0.15";
@@ -106,7 +106,7 @@ class Room {
     this.#apply.classList.add("primary");
     this.#drawing = el("div", { class: "drawing", hidden: true }, el("p", {}, tx("drawHelp")),
       button(tx("finish"), "", () => this.#face.finish()), button(tx("cancel"), "", () => this.#face.cancel()));
-    // What is told lies over the wall: a line above it would move the wall under the pointer.
+    // Messages lie over the wall: a line above it would move the wall under the pointer.
     const told = el("div", { class: "told" }, this.#status, this.#error);
     this.element = el("div", { class: "room" }, this.#toolbar(),
       el("div", { class: "work" },

@@ -126,7 +126,7 @@ function parameters(project: ProjectShown, schema: Schema, live: Live): HTMLElem
     if (!changes) return;
     error.hidden = true;
     try {
-      // The page is shown anew when the state tells of the new file.
+      // The page is shown anew when the state contains the new file.
       await server.change({ changes });
       count.textContent = tx("saved");
     } catch (refused) {

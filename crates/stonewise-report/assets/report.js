@@ -1,4 +1,4 @@
-/* stonewise report; sources 38267064395a544d, bundle 70f1cc8cbd863ec0 */
+/* stonewise report; sources 6df8a12ddfdb7d76, bundle 70f1cc8cbd863ec0 */
 /* This bundle contains three.js.
 The MIT License
 

@@ -18,7 +18,7 @@ const CLOUDS: readonly (readonly [Clouds, TextKey])[] = [["none", "cloudNone"], 
 
 /** Patches stand this far before the plane of their stone, so that its relief does not hide them, metres. */
 const LIFT_M = 0.02;
-/** Beyond so many stones outlines are left out and edges are not smoothed: they would be finer than a pixel. */
+/** Beyond this number of stones outlines are left out and edges are not smoothed: they would be finer than a pixel. */
 const MANY_STONES = 3000;
 /** Half the width of a joint's ribbon, in square roots of the median stone's area. */
 const RIBBON = 0.035;
