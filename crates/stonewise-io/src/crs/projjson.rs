@@ -8,17 +8,19 @@ use serde_json::{Value, json};
 pub fn projjson(code: u32) -> Option<Value> {
     let system = projected(code)?;
     let (method, names) = method(system.method)?;
+    // WKT 1 says this in the name.
+    let name = system.name.trim_end_matches(" (deprecated)");
     let base = &system.base;
     let angle = unit("AngularUnit", "degree", base.unit, base.radians)?;
     let length = unit("LinearUnit", "metre", system.unit, system.metres)?;
     let mut parameters = Vec::new();
-    for (name, (_, value)) in names.iter().zip(&system.parameters) {
-        let unit = match name {
-            _ if name.starts_with("Scale") => &json!("unity"),
-            _ if name.contains("asting") || name.contains("orthing") => &length,
+    for (parameter, (_, value)) in names.iter().zip(&system.parameters) {
+        let unit = match parameter {
+            _ if parameter.starts_with("Scale") => &json!("unity"),
+            _ if parameter.contains("asting") || parameter.contains("orthing") => &length,
             _ => &angle,
         };
-        parameters.push(json!({ "name": name, "value": number(value)?, "unit": unit }));
+        parameters.push(json!({ "name": parameter, "value": number(value)?, "unit": unit }));
     }
     let axis = |name: &str, abbreviation: &str, direction: &str, unit: &Value| json!({ "name": name, "abbreviation": abbreviation, "direction": direction, "unit": unit });
     let mut axes = [
@@ -33,7 +35,7 @@ pub fn projjson(code: u32) -> Option<Value> {
     Some(json!({
         "$schema": "https://proj.org/schemas/v0.7/projjson.schema.json",
         "type": "ProjectedCRS",
-        "name": system.name,
+        "name": name,
         "base_crs": {
             "name": base.name,
             "datum": datum(&system)?,
@@ -46,7 +48,7 @@ pub fn projjson(code: u32) -> Option<Value> {
             },
             "id": { "authority": "EPSG", "code": base.code },
         },
-        "conversion": { "name": system.name, "method": { "name": method }, "parameters": parameters },
+        "conversion": { "name": name, "method": { "name": method }, "parameters": parameters },
         "coordinate_system": { "subtype": "Cartesian", "axis": axes },
         "id": { "authority": "EPSG", "code": code },
     }))
@@ -186,15 +188,30 @@ mod tests {
             }
             let datum = system["base_crs"].get("datum_ensemble");
             let datum = datum.unwrap_or(&system["base_crs"]["datum"]);
-            let ellipsoid = &found["base_crs"]["datum"]["ellipsoid"];
-            for key in ["semi_major_axis", "inverse_flattening"] {
-                assert_eq!(
-                    ellipsoid[key].as_f64(),
-                    datum["ellipsoid"][key].as_f64(),
-                    "EPSG:{code}"
-                );
-            }
+            let [own, expected] = [&found["base_crs"]["datum"], datum].map(|datum| &datum["ellipsoid"]);
+            let [major, expected_major] = [own, expected].map(|e| metres(&e["semi_major_axis"]));
+            assert!((major / expected_major - 1.0).abs() < 1e-12, "EPSG:{code}");
+            let [own, expected] = [own, expected].map(inverse_flattening);
+            assert!(
+                (own - expected).abs() < 1e-9 * expected,
+                "EPSG:{code}: {own} {expected}"
+            );
         }
+    }
+
+    /// A length, in metres or with a unit of its own.
+    fn metres(length: &Value) -> f64 {
+        let in_unit = || Some(length["value"].as_f64()? * length["unit"]["conversion_factor"].as_f64()?);
+        length.as_f64().or_else(in_unit).unwrap()
+    }
+
+    /// Some ellipsoids are given by both axes.
+    fn inverse_flattening(ellipsoid: &Value) -> f64 {
+        let by_axes = || {
+            let [major, minor] = ["semi_major_axis", "semi_minor_axis"].map(|key| metres(&ellipsoid[key]));
+            major / (major - minor)
+        };
+        ellipsoid["inverse_flattening"].as_f64().unwrap_or_else(by_axes)
     }
 
     /// Both by name, or of one size.

@@ -401,7 +401,7 @@ fn fine_needs_the_shape_too() {
     let none = Thresholds::default();
     let kept = judge(&bulged(false), &none);
     assert_eq!(kept.state, State::Fine, "{}", kept.sentence);
-    let words = "no change of the shape of the wall is shown (detection limits for a zone of 1 m: 0.60 mm out of the wall, 1.20 mm in its face)";
+    let words = "no change of the shape of the wall is shown (detection limits for a zone of 1 m: 0.60 mm out of the wall, 1.2 mm in its face)";
     assert!(kept.sentence.contains(words), "{}", kept.sentence);
     let changed = judge(&bulged(true), &none);
     assert_eq!(codes(&changed), [ReasonCode::DeformationShown]);

@@ -8,6 +8,7 @@
 //! Niemeier 1981.
 
 mod body;
+mod bulge;
 mod found;
 mod random;
 mod rigid_part;

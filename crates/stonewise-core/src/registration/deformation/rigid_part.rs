@@ -1,8 +1,8 @@
 //! The rigid motion of the part of the wall that kept its shape, and what stones moved besides.
 
 use super::body::{Body, BodyStone, Covariance, Matrix3x6};
+use super::bulge::MostLikely;
 use super::random::Random;
-use super::scan::MostLikely;
 use crate::statistics::{biweight, biweight_loss, congruent_scale};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;

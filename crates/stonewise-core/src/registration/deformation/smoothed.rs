@@ -9,7 +9,7 @@
 //! 1999).
 
 use super::body::Body;
-use super::scan::Bulge;
+use super::bulge::Bulge;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
