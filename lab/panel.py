@@ -573,6 +573,7 @@ def main():
     out = Path(arguments.out or tempfile.mkdtemp(prefix="stonewise-panel-"))
     print(f"| {' | '.join(COLUMNS)} |\n|{' --- |' * len(COLUMNS)}")
     for survey in chosen:
+        survey = dataclasses.replace(survey, seed=survey.seed + arguments.seeds_up)
         figures = {"survey": survey.name, "expected": survey.verdict}
         try:
             figures |= measure(survey, out / survey.name, arguments.binary)
@@ -590,6 +591,9 @@ def parse():
     parser.add_argument("--binary", type=Path, default=ROOT / "target/release/stonewise")
     parser.add_argument(
         "--out", help="replaces a folder per survey in this one; a temporary one when absent"
+    )
+    parser.add_argument(
+        "--seeds-up", type=int, default=0, metavar="N", help="add N to the seed of every survey"
     )
     parser.add_argument("--list", action="store_true", help="print names and expected verdicts")
     return parser.parse_args()

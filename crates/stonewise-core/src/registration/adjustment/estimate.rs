@@ -31,10 +31,18 @@ pub(crate) struct Estimate {
 /// What holds of a stone if it moved in one of the ways that are possible.
 struct Case {
     probability: f64,
+    /// Logarithm of the density of the stone's observations in this case.
+    log_evidence: f64,
     mean: StoneVector,
     covariance: Matrix9,
     relative_covariance: Matrix3<f64>,
     by_field: Matrix9,
+}
+
+impl Case {
+    fn of_probability(self, probability: f64) -> Self {
+        Self { probability, ..self }
+    }
 }
 
 impl Adjustment {
@@ -59,11 +67,7 @@ impl Adjustment {
         // What counts as an error might be a motion after all.
         let slide_m2 = self.undetected_slide_m(i).powi(2);
 
-        let case_of = |probability: f64,
-                       prediction: &Prediction,
-                       equations: &NormalEquations,
-                       own: &[f64; 9],
-                       slide_m2: f64| {
+        let case = |prediction: &Prediction, equations: &NormalEquations, own: &[f64; 9], slide_m2: f64| {
             let found = posterior(equations, prediction, own);
             let mut covariance = found.covariance;
             let mut relative_covariance = covariance_against(&found, prediction, own, shared);
@@ -72,31 +76,27 @@ impl Adjustment {
                 relative_covariance[(k, k)] += slide_m2;
             }
             Case {
-                probability,
+                probability: 1.0,
+                log_evidence: found.log_evidence,
                 mean: found.mean,
                 covariance,
                 relative_covariance,
                 by_field: by_field(equations, own),
             }
         };
-
-        let case = |probability: f64, equations: &NormalEquations, own: &[f64; 9], slide_m2: f64| {
-            case_of(probability, prediction, equations, own, slide_m2)
-        };
         let own = self.prior.own_variances();
 
         let tied = |probability: f64| {
-            let equations = &equations.with_field;
+            let here = case(prediction, &equations.with_field, &own, slide_m2);
             let Some(across_m) = across_m else {
-                return vec![case(probability, equations, &own, slide_m2)];
+                return vec![here.of_probability(probability)];
             };
-            let beyond = prediction.moved(across_m);
-            let log_evidence = |prediction| posterior(equations, prediction, &own).log_evidence;
-            let log_odds = log_evidence(&beyond) - log_evidence(prediction) + (ACROSS / (1.0 - ACROSS)).ln();
+            let beyond = case(&prediction.moved(across_m), &equations.with_field, &own, slide_m2);
+            let log_odds = beyond.log_evidence - here.log_evidence + (ACROSS / (1.0 - ACROSS)).ln();
             let p_across = 1.0 / (1.0 + (-log_odds).exp());
             vec![
-                case(probability * (1.0 - p_across), equations, &own, slide_m2),
-                case_of(probability * p_across, &beyond, equations, &own, slide_m2),
+                here.of_probability(probability * (1.0 - p_across)),
+                beyond.of_probability(probability * p_across),
             ]
         };
 
@@ -117,8 +117,9 @@ impl Adjustment {
 
         let without_clouds = photos.unwrap_or_else(NormalEquations::nothing);
         let mut cases = tied(p_tied);
-        cases.push(case(p_loose, at_own, &self.prior.loose_variances(), 0.0));
-        cases.push(case(p_wrong, &without_clouds, &own, slide_m2));
+        let loose = case(prediction, at_own, &self.prior.loose_variances(), 0.0);
+        let wrong = case(prediction, &without_clouds, &own, slide_m2);
+        cases.extend([loose.of_probability(p_loose), wrong.of_probability(p_wrong)]);
         Estimate::of(&cases)
     }
 
