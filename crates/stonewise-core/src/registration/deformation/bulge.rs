@@ -1,16 +1,42 @@
 //! A bulge of some place and size, and what the observations of its stones show of it.
 
+use super::body::Body;
 use crate::registration::bulges::RIM;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
+
+/// What the observations can show of a bulge's amplitude in one direction.
+#[derive(Clone, Copy)]
+pub(super) struct Direction {
+    /// Standard deviation of the score.
+    pub score_sd: f64,
+    /// Information on the amplitude: the score of a bulge of one metre.
+    pub information: f64,
+}
+
+impl Direction {
+    /// A score in standard deviations.
+    pub fn standardised(&self, score: f64) -> f64 {
+        score / self.score_sd
+    }
+
+    /// Amplitude of this score, metres.
+    pub fn amplitude_m(&self, score: f64) -> f64 {
+        score / self.information
+    }
+
+    /// Standard deviation of the amplitude, metres.
+    pub fn amplitude_sd_m(&self) -> f64 {
+        self.score_sd / self.information
+    }
+}
 
 /// A bulge of some place and size in three directions: along, up and out.
 pub(super) struct Bulge {
     pub diameter_m: f64,
     /// Stones and by how much of the amplitude they move.
     pub stones: Vec<(usize, f64)>,
-    /// Standard deviation of the score, and information on the amplitude, in each direction; `None` where nothing shows
-    /// it.
-    pub directions: [Option<(f64, f64)>; 3],
+    /// `None` where nothing shows it.
+    pub directions: [Option<Direction>; 3],
 }
 
 impl Bulge {
@@ -22,7 +48,7 @@ impl Bulge {
     /// The largest score of any direction in standard deviations.
     pub fn largest(&self, rest: &[Vector3<f64>]) -> f64 {
         let score = self.scores(rest);
-        let z = |k: usize| self.directions[k].map_or(0.0, |(sd, _)| score[k].abs() / sd);
+        let z = |k: usize| self.directions[k].map_or(0.0, |d| d.standardised(score[k]).abs());
         z(0).max(z(1)).max(z(2))
     }
 
@@ -30,21 +56,40 @@ impl Bulge {
     /// show beyond the motions. `None` where nothing shows it.
     pub fn most_likely(&self, left_over: &[Vec<Vector3<f64>>; 2]) -> Option<MostLikely> {
         let [score, smoothed] = left_over.each_ref().map(|rest| self.scores(rest));
-        let shown = |k: usize| self.directions[k].map(|(sd, information)| (k, sd, information));
-        let size = |(k, sd, _): &(usize, f64, f64)| score[*k].abs() / sd;
-        let (direction, sd, information) = (0..3)
+        let shown = |k: usize| Some((k, self.directions[k]?));
+        let size = |(k, direction): &(usize, Direction)| direction.standardised(score[*k]).abs();
+        let (number, direction) = (0..3)
             .filter_map(shown)
             .max_by(|a, b| size(a).total_cmp(&size(b)))?;
         let stones = self.stones.iter().filter(|(_, share)| *share > RIM);
+        let missing = |k: usize| {
+            self.directions[k].map_or(0.0, |d| {
+                d.amplitude_m(smoothed[k]).powi(2) + d.amplitude_sd_m().powi(2)
+            })
+        };
+
         Some(MostLikely {
             stones: stones.copied().collect(),
-            direction,
-            amplitude_m: (score[direction] / information, sd / information),
-            smoothed_m: std::array::from_fn(|k| {
-                let (sd, information) = self.directions[k]?;
-                Some((smoothed[k] / information, sd / information))
-            }),
+            direction: number,
+            amplitude_m: direction.amplitude_m(score[number]),
+            amplitude_sd_m: direction.amplitude_sd_m(),
+            smoothed_m2: Vector3::new(missing(0), missing(1), missing(2)),
         })
+    }
+}
+
+/// Adds to the covariances of these stones (world) a motion of the squares `along_up_out` in their frames, each by its
+/// share in a bulge.
+pub(super) fn add_squares(
+    covariances: &mut [Matrix3<f64>],
+    body: &Body,
+    stones: &[(usize, f64)],
+    along_up_out: &Vector3<f64>,
+) {
+    let squares = Matrix3::from_diagonal(along_up_out);
+    for (i, share) in stones {
+        let face_from_world = body.stones[*i].joint.face_from_world;
+        covariances[*i] += face_from_world.transpose() * squares * face_from_world * share.powi(2);
     }
 }
 
@@ -54,9 +99,10 @@ pub(super) struct MostLikely {
     pub stones: Vec<(usize, f64)>,
     /// Its direction: along, up or out.
     pub direction: usize,
-    /// Amplitude and its standard deviation, metres.
-    pub amplitude_m: (f64, f64),
-    /// What the motions show less of a bulge there than the stones' own observations, and the standard deviation of its
-    /// amplitude, metres: along, up and out. `None` where nothing shows it.
-    pub smoothed_m: [Option<(f64, f64)>; 3],
+    pub amplitude_m: f64,
+    /// Standard deviation of the amplitude, metres.
+    pub amplitude_sd_m: f64,
+    /// What the motions may miss of a bulge there, along, up and out, m^2: the square of what the stones' own
+    /// observations show beyond them, and the variance of its amplitude. 0 where nothing shows it.
+    pub smoothed_m2: Vector3<f64>,
 }

@@ -1,7 +1,7 @@
 //! The rigid motion of the part of the wall that kept its shape, and what stones moved besides.
 
 use super::body::{Body, BodyStone, Covariance, Matrix3x6};
-use super::bulge::MostLikely;
+use super::bulge::{MostLikely, add_squares};
 use super::random::Random;
 use crate::statistics::{biweight, biweight_loss, congruent_scale};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
@@ -33,16 +33,7 @@ impl RigidPart {
     /// follows, is no evidence of that: it is known no better than the stones' own observations show it.
     pub fn doubt_smoothed(&mut self, body: &Body, bulge: &MostLikely) {
         let mut covariances = vec![Matrix3::zeros(); body.stones.len()];
-        for (k, smoothed) in bulge.smoothed_m.iter().enumerate() {
-            let Some((smoothed_m, sd_m)) = smoothed else {
-                continue;
-            };
-            for (i, share) in &bulge.stones {
-                let direction = body.stones[*i].joint.face_from_world.row(k).transpose();
-                let missed = direction * (smoothed_m.hypot(*sd_m) * share);
-                covariances[*i] += missed * missed.transpose();
-            }
-        }
+        add_squares(&mut covariances, body, &bulge.stones, &bulge.smoothed_m2);
         self.widen(&covariances);
     }
 

@@ -9,7 +9,7 @@
 //! and there (Huber 1964), so that no single stone is called a deformation of the wall.
 
 use super::body::{Body, BodyStone};
-use super::bulge::{Bulge, MostLikely};
+use super::bulge::{Bulge, Direction, MostLikely};
 use super::found::{LEVEL, OUTSIDE, ZONE_EXTENTS_M};
 use super::random::Random;
 use super::smoothed::smoothed;
@@ -100,7 +100,7 @@ pub(super) fn scan(body: &Body) -> Option<Scan> {
 /// these in which it must be largest.
 fn detection_limit_m(bulges: &[Bulge], extent_m: f64, directions: &[usize], limit: f64) -> Option<f64> {
     let of_bulge = |bulge: &Bulge| {
-        let in_direction = |&k: &usize| bulge.directions[k].map(|(sd, information)| sd / information);
+        let in_direction = |&k: &usize| Some(bulge.directions[k]?.amplitude_sd_m());
         let sds: Option<Vec<f64>> = directions.iter().map(in_direction).collect();
         Some((limit + POWER) * sds?.into_iter().fold(0.0, f64::max))
     };
@@ -179,8 +179,8 @@ impl<'a> Model<'a> {
         rest
     }
 
-    /// Standard deviation of the score of each direction, and information on the amplitude.
-    fn directions(&self, stones: &[(usize, f64)]) -> [Option<(f64, f64)>; 3] {
+    /// What the observations can show in each direction of a bulge of these stones.
+    fn directions(&self, stones: &[(usize, f64)]) -> [Option<Direction>; 3] {
         let (mut plain, mut with_rigid) = (Matrix3::zeros(), SMatrix::<f64, 6, 3>::zeros());
         let mut of_shared = self.body.shared.zeros::<3>();
         for (i, share) in stones {
@@ -198,7 +198,10 @@ impl<'a> Model<'a> {
         std::array::from_fn(|k| {
             let left = information[(k, k)];
             let variance = left + shared[(k, k)];
-            (left > LEAST_SHARE * plain[(k, k)] && variance > 0.0).then(|| (variance.sqrt(), left))
+            (left > LEAST_SHARE * plain[(k, k)] && variance > 0.0).then(|| Direction {
+                score_sd: variance.sqrt(),
+                information: left,
+            })
         })
     }
 }

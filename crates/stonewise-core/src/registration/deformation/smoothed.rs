@@ -9,7 +9,7 @@
 //! 1999).
 
 use super::body::Body;
-use super::bulge::Bulge;
+use super::bulge::{Bulge, add_squares};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -39,8 +39,11 @@ pub(super) fn smoothed(body: &Body, bulges: &[Bulge], beyond: &[Vector3<f64>]) -
     let of_bulge = |bulge: &Bulge| {
         let scores = bulge.scores(beyond);
         let missing = |k: usize| {
-            let (sd, information) = bulge.directions[k]?;
-            Some(Missing::new(scores[k] / sd, sd / information))
+            let direction = bulge.directions[k]?;
+            Some(Missing::new(
+                direction.standardised(scores[k]),
+                direction.amplitude_sd_m(),
+            ))
         };
         [0, 1, 2].map(missing)
     };
@@ -57,11 +60,8 @@ pub(super) fn smoothed(body: &Body, bulges: &[Bulge], beyond: &[Vector3<f64>]) -
             let missing = directions[k].as_ref();
             missing.map_or(0.0, |m| weight(m) / total * m.square)
         };
-        let squares = Matrix3::from_diagonal(&Vector3::new(square(0), square(1), square(2)));
-        for (i, share) in &bulge.stones {
-            let face_from_world = body.stones[*i].joint.face_from_world;
-            covariances[*i] += face_from_world.transpose() * squares * face_from_world * share.powi(2);
-        }
+        let squares = Vector3::new(square(0), square(1), square(2));
+        add_squares(&mut covariances, body, &bulge.stones, &squares);
     }
     covariances
 }

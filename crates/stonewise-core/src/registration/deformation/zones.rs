@@ -59,11 +59,13 @@ pub(super) fn zones(body: &Body, rigid: &RigidPart, scan: &Scan) -> Vec<Deformat
 /// and directions.
 fn bulge(body: &Body, scan: &Scan) -> DeformationZone {
     let found = &scan.most_likely;
-    let (amplitude_m, sd_m) = found.amplitude_m;
-    let moved = |(_, share): &(usize, f64)| Vector3::ith(found.direction, amplitude_m * share);
+    let moved = |(_, share): &(usize, f64)| Vector3::ith(found.direction, found.amplitude_m * share);
     let in_face: Vec<Vector3<f64>> = found.stones.iter().map(moved).collect();
     let largest = found.stones.iter().map(|s| s.1).fold(0.0, f64::max);
-    let (largest_m, half_m) = (largest * amplitude_m.abs(), scan.reach * largest * sd_m);
+    let (largest_m, half_m) = (
+        largest * found.amplitude_m.abs(),
+        scan.reach * largest * found.amplitude_sd_m,
+    );
     let interval_m = [(largest_m - half_m).max(0.0), largest_m + half_m];
     let stones: Vec<usize> = found.stones.iter().map(|s| s.0).collect();
     described(body, &stones, &in_face, largest_m, interval_m)
