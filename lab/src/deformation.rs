@@ -10,10 +10,12 @@
 //! Columns: walls of which a deformation is claimed; coverage of the 95 % intervals of `def_*` along, up and out;
 //! root mean square of their errors and standard deviations, mm; walls whose bulge has a zone over its middle, and the
 //! mean overlap (IoU) of that zone with the stones that moved by more than a quarter of the bulge; detection limit of a
-//! zone of 1 and 3 m out of the wall, and of 1 m in its face, mm.
+//! zone of 1 and 3 m out of the wall, and of 1 m in its face, mm; mean CRPS along, up and out, mm, over that of a
+//! normal distribution as wide as the errors (see [`crate::sharpness`]), and the same ratio of the interval score.
 
 use crate::Outcome;
 use crate::figures::{coverage, rms_of_axes};
+use crate::sharpness::Sharpness;
 use crate::survey::ScannedWall;
 use crate::table::Table;
 use crate::words::Words;
@@ -56,6 +58,9 @@ pub fn run(words: &Words) -> Outcome {
         "limit 1 m",
         "3 m",
         "in face 1 m",
+        "CRPS mm",
+        "over calibrated",
+        "interval score over calibrated",
         "s",
     ]);
 
@@ -213,6 +218,17 @@ fn cells(label: &str, walls: &[Wall], seconds: f64) -> Vec<String> {
     let stones: Vec<&[Vector3<f64>; 2]> = walls.iter().flat_map(|w| &w.stones).collect();
     let held = |axis: usize| coverage(&stones, axis);
     let of_axes = |part: usize| rms_of_axes(&stones, part);
+    let scores = [0, 1, 2].map(|axis| {
+        let mut all = Sharpness::default();
+        stones
+            .iter()
+            .for_each(|[e, sd]| all.add(1e3 * e[axis], 1e3 * sd[axis]));
+        all
+    });
+    let score = |digits: usize, of: fn(&Sharpness) -> f64| {
+        let axes = scores.each_ref().map(|s| format!("{:.digits$}", of(s)));
+        axes.join(" / ")
+    };
     let overlaps: Vec<f64> = walls.iter().filter_map(|w| w.overlap).collect();
 
     let limit = |of: &dyn Fn(&Wall) -> Option<f64>| {
@@ -240,6 +256,9 @@ fn cells(label: &str, walls: &[Wall], seconds: f64) -> Vec<String> {
         limit(&|w| w.limits_m[0]),
         limit(&|w| w.limits_m[1]),
         limit(&|w| w.limits_in_face_m[0]),
+        score(3, Sharpness::crps),
+        score(2, Sharpness::crps_ratio),
+        score(2, Sharpness::interval_ratio),
         format!("{seconds:.0}"),
     ]
 }

@@ -10,6 +10,7 @@ mod photo_curves;
 mod projjson;
 mod sample_report;
 mod series;
+mod sharpness;
 mod speed;
 mod survey;
 mod table;

@@ -2,6 +2,7 @@
 
 use super::small_wall::Survey;
 use crate::figures::{CHI2_3_95, Z95, chi_square, share};
+use crate::sharpness::Sharpness;
 use crate::table::{Figure, Table};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
@@ -16,6 +17,8 @@ pub struct Wall {
     pub datum: Option<Datum>,
     /// Stones whose interval holds the truth, along each axis and jointly.
     inside: [f64; 4],
+    /// Scores of the stones' errors along each axis, millimetres.
+    sharpness: [Sharpness; 3],
     /// Stones whose interval holds the truth along each axis, the rigid part of the errors removed.
     inside_relative: [f64; 3],
     chi_square: f64,
@@ -65,6 +68,7 @@ impl Wall {
             for axis in 0..3 {
                 let holds = error[axis].abs() < Z95 * spread[(axis, axis)].sqrt();
                 wall.inside[axis] += f64::from(u8::from(holds)) / n;
+                wall.sharpness[axis].add(1e3 * error[axis], 1e3 * spread[(axis, axis)].sqrt());
             }
             let chi = chi_square(&rest, &covariance);
             wall.inside[3] += f64::from(u8::from(chi < CHI2_3_95)) / n;
@@ -142,12 +146,22 @@ impl Row {
         (self.mean(|w| w.square[k]) / 3.0).sqrt()
     }
 
+    /// A score's mean over the axes.
+    fn score(&self, of: impl Fn(&Sharpness) -> f64) -> f64 {
+        (0..3).map(|axis| of(&self.sharpness(axis))).sum::<f64>() / 3.0
+    }
+
+    fn sharpness(&self, axis: usize) -> Sharpness {
+        let of_walls = self.known.iter().map(|w| w.sharpness[axis]);
+        of_walls.fold(Sharpness::default(), |a, b| a.with(&b))
+    }
+
     fn share(&self, holds: impl Fn(&Wall) -> bool) -> f64 {
         share(self.walls.len(), |i| holds(&self.walls[i]))
     }
 }
 
-const COLUMNS: [Figure<Row>; 19] = [
+const COLUMNS: [Figure<Row>; 25] = [
     ("unknown", 2, |r| r.share(|w| w.datum == Some(Datum::Unknown))),
     ("along", 3, |r| r.mean(|w| w.inside[0])),
     ("up", 3, |r| r.mean(|w| w.inside[1])),
@@ -168,6 +182,12 @@ const COLUMNS: [Figure<Row>; 19] = [
     ("called stone by stone", 3, |r| r.share(|w| w.called[0])),
     ("FDR", 3, |r| r.share(|w| w.called[1])),
     ("made worse by stable areas", 3, |r| r.share(|w| w.is_worse)),
+    ("CRPS, mm", 3, |r| r.score(Sharpness::crps)),
+    ("over calibrated: along", 2, |r| r.sharpness(0).crps_ratio()),
+    ("up", 2, |r| r.sharpness(1).crps_ratio()),
+    ("out", 2, |r| r.sharpness(2).crps_ratio()),
+    ("interval score, mm", 2, |r| r.score(Sharpness::interval)),
+    ("over calibrated", 2, |r| r.score(Sharpness::interval_ratio)),
     ("s", 0, |r| r.seconds),
 ];
 

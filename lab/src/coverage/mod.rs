@@ -10,7 +10,8 @@
 //!
 //! A row pools the stones of its walls. Errors are shared by all stones of a wall, so ranges are those of
 //! walls drawn anew (percentile bootstrap, Efron 1979); the first row says between which figures the coverage
-//! of a perfect method would lie.
+//! of a perfect method would lie. "Over calibrated": mean scores over those of a normal distribution as wide as the
+//! errors (see [`crate::sharpness`]).
 
 mod ablation;
 mod errors;
