@@ -1,11 +1,11 @@
 //! What the simulator promises about its clouds, measured back from them.
 #![allow(clippy::unwrap_used)] // helpers outside the tests fail like them
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use stonewise_core::cloud::GridIndex;
 use stonewise_simulate::{
-    EpochScans, FacePoint, Scan, SceneParams, Sensor, SurroundingsParams, Target, TlsParams, UavParams,
-    WallMotion, WallParams, Window, World, scan_window, surroundings,
+    BeamParams, EpochScans, FacePoint, Scan, SceneParams, Sensor, StationPlace, SurroundingsParams, Target,
+    TlsParams, UavParams, WallMotion, WallParams, Window, World, scan_window, surroundings,
 };
 
 fn small(seed: u64) -> SceneParams {
@@ -281,6 +281,80 @@ fn a_dam_scanned_piece_by_piece_is_the_dam_scanned_at_once() {
             whole.len()
         );
         assert!(same * 1000 >= count * 999, "{sensor:?}: {same} of {count}");
+    }
+}
+
+#[test]
+fn stated_stations_stand_in_their_places_with_their_own_instruments() {
+    let beam = |range_noise_m: f64| BeamParams {
+        range_noise_m,
+        ..plain_tls().beam
+    };
+    let places = vec![
+        StationPlace {
+            along_m: -0.4,
+            distance_m: 5.0,
+            step_rad: 2e-3,
+            beam: beam(0.001),
+            ..StationPlace::default()
+        },
+        StationPlace {
+            along_m: 2.6,
+            distance_m: 8.0,
+            height_m: 3.0,
+            step_rad: 1e-3,
+            beam: beam(0.004),
+            ..StationPlace::default()
+        },
+    ];
+    let params = SceneParams {
+        surroundings: SurroundingsParams::none(),
+        tls: Some(TlsParams {
+            places: places.clone(),
+            ..plain_tls()
+        }),
+        ..small(12)
+    };
+    let world = World::new(&params);
+    let scan = world.scan(&params, 0).tls.unwrap();
+    for (number, stated) in places.iter().enumerate() {
+        let of_station: Vec<usize> = (0..scan.len())
+            .filter(|&i| scan.source[i] as usize == number + 1 && scan.stone[i] > 0)
+            .collect();
+        // Noise lies along the beams, so that they meet where the station stands: its height is known to 10 cm.
+        let (mut matrix, mut side) = (Matrix3::zeros(), Vector3::zeros());
+        let mut noise = Vec::new();
+        for &i in &of_station {
+            let error = scan.cloud.world(i) - exact(&scan, i);
+            let along = error.normalize();
+            let across = Matrix3::identity() - along * along.transpose();
+            let weight = error.norm_squared();
+            matrix += weight * across;
+            side += weight * across * exact(&scan, i).coords;
+            noise.push(error.norm() * f64::from(scan.cos_incidence[i]).sqrt());
+        }
+        let station = Point3::from(matrix.lu().solve(&side).unwrap());
+        let at = world.wall.face.world_of(&FacePoint {
+            a: stated.along_m,
+            u: 0.0,
+            n: stated.distance_m,
+        });
+        let place = Point3::new(at.x, at.y, stated.height_m);
+        assert!((station - place).norm() < 0.15, "{station} {place}");
+        let noise = rms(noise.into_iter());
+        assert!((noise / stated.beam.range_noise_m - 1.0).abs() < 0.05, "{noise}");
+        // As many beams as the angle that the stones fill holds.
+        let solid: f64 = { of_station.iter() }
+            .map(|&i| (exact(&scan, i) - station).norm_squared())
+            .map(|square| square * stated.step_rad.powi(2))
+            .sum();
+        let (area, cos) = (
+            1.8 * 1.4,
+            of_station.iter().map(|&i| f64::from(scan.cos_incidence[i])),
+        );
+        let cos = cos.sum::<f64>() / of_station.len() as f64;
+        let share = solid / (area * cos);
+        assert!((0.6..1.1).contains(&share), "{share}");
     }
 }
 

@@ -228,8 +228,15 @@ impl SurveyParams {
             ("photos.focal_px", photos.focal_px),
             ("photos.distance_m", photos.distance_m),
         ];
+        let places = self.scene.tls.iter().flat_map(|tls| &tls.places);
+        let of_places = places.flat_map(|place| {
+            [
+                ("scene.tls.places.distance_m", place.distance_m),
+                ("scene.tls.places.step_rad", place.step_rad),
+            ]
+        });
 
-        for (key, value) in positive {
+        for (key, value) in positive.into_iter().chain(of_places) {
             require(
                 value.is_finite() && value > 0.0,
                 key,

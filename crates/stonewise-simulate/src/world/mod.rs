@@ -38,7 +38,7 @@ pub use scene::{Hit, Scene, Target};
 pub use strip_error::{FlightErrorParams, StripDrift, StripErrors};
 pub use surface::{HeightGrid, SampledFaces, Surface};
 pub use survey::{EpochScans, SceneParams, Sensor, World, scan_window};
-pub use tls::{TlsParams, scan_terrestrial};
+pub use tls::{StationPlace, TlsParams, scan_terrestrial};
 pub use truth::{SeenCells, StoneTruth, shown_stones, stone_truths, window_truths};
 pub use uav::{UavParams, scan_airborne};
 pub use wall::{SimStone, Wall};

@@ -40,6 +40,41 @@ pub struct TlsParams {
     pub scale_error: f64,
     /// The instrument.
     pub beam: BeamParams,
+    /// Stations at stated places, each with its own instrument, instead of `stations` of one kind: then `stations`,
+    /// `distance_m`, `reach_m`, `height_m`, `spacing_m` and `beam` do not count.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub places: Vec<StationPlace>,
+}
+
+/// A station at a stated place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StationPlace {
+    /// Place along the section, from its middle, metres.
+    pub along_m: f64,
+    /// Distance from the face, metres.
+    pub distance_m: f64,
+    /// Height of the scanner over ground, metres.
+    pub height_m: f64,
+    /// How far to either side along the section it scans, metres; 0 for all of the section.
+    pub reach_m: f64,
+    /// Angle between neighbouring beams, radians.
+    pub step_rad: f64,
+    /// The instrument.
+    pub beam: BeamParams,
+}
+
+impl Default for StationPlace {
+    fn default() -> Self {
+        Self {
+            along_m: 0.0,
+            distance_m: 9.0,
+            height_m: 1.7,
+            reach_m: 0.0,
+            step_rad: 7e-4,
+            beam: BeamParams::terrestrial(),
+        }
+    }
 }
 
 impl Default for TlsParams {
@@ -57,13 +92,15 @@ impl Default for TlsParams {
             datum_m: 0.0,
             scale_error: 0.0,
             beam: BeamParams::terrestrial(),
+            places: Vec::new(),
         }
     }
 }
 
 /// One station: where it stands, and the grid of its rays.
-struct Station {
+struct Station<'a> {
     number: u32,
+    beam: &'a BeamParams,
     place: Point3<f64>,
     step_rad: f64,
     /// Smallest and largest a that it scans, metres.
@@ -98,7 +135,7 @@ pub fn scan_terrestrial(scene: &Scene, window: &Window, params: &TlsParams, seed
             window,
             params,
             station: &station,
-            instrument: Instrument::new(scene, &params.beam, station.scale, seed),
+            instrument: Instrument::new(scene, station.beam, station.scale, seed),
             part: grown(part, ASTRAY_M),
             azimuths: [west, east],
             seed,
@@ -126,7 +163,7 @@ struct Sweep<'a> {
     scene: &'a Scene<'a>,
     window: &'a Window,
     params: &'a TlsParams,
-    station: &'a Station,
+    station: &'a Station<'a>,
     instrument: Instrument<'a>,
     /// The part of the face that is looked at: smallest a, largest a, smallest u, largest u, metres.
     part: [f64; 4],
@@ -174,7 +211,7 @@ impl Sweep<'_> {
     }
 }
 
-impl Station {
+impl Station<'_> {
     /// When a beam is sent: rows from below, each from the left, all of the same duration.
     fn time_s(&self, row: i64, column: i64) -> f64 {
         let [west, east, low, _] = self.field;
@@ -220,7 +257,7 @@ impl Station {
     }
 }
 
-fn stations(scene: &Scene, params: &TlsParams, seed: u64) -> Vec<Station> {
+fn stations<'a>(scene: &Scene, params: &'a TlsParams, seed: u64) -> Vec<Station<'a>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let extent = scene.wall().extent();
     let face = &scene.wall().face;
@@ -232,14 +269,21 @@ fn stations(scene: &Scene, params: &TlsParams, seed: u64) -> Vec<Station> {
         reach if reach > 0.0 => (2.0 * reach / apart).clamp(1.0, f64::from(params.stations)),
         _ => f64::from(params.stations),
     };
-    (0..params.stations)
+    let count = match params.places.len() {
+        0 => params.stations,
+        stated => stated as u32,
+    };
+    (0..count)
         .map(|k| {
+            let stated = params.places.get(k as usize);
             let share = (f64::from(k) + 0.5) / f64::from(params.stations);
+            let even = extent[0] + (extent[1] - extent[0]) * share;
             let mut jitter = |size: f64| size * rng.random_range(-1.0..=1.0);
-            let a = extent[0] + (extent[1] - extent[0]) * share + jitter(params.placement_m);
-            let n = params.distance_m + jitter(params.placement_m);
+            let a = stated.map_or(even, |s| s.along_m) + jitter(params.placement_m);
+            let n = stated.map_or(params.distance_m, |s| s.distance_m) + jitter(params.placement_m);
+            let height_m = stated.map_or(params.height_m, |s| s.height_m);
             let foot = face.world_of(&FacePoint { a, u: 0.0, n });
-            let place = Point3::new(foot.x, foot.y, params.height_m + jitter(0.1));
+            let place = Point3::new(foot.x, foot.y, height_m + jitter(0.1));
             // Targets stand near the wall: there the registration is at its best.
             let front = face.world_of(&FacePoint {
                 a,
@@ -248,15 +292,15 @@ fn stations(scene: &Scene, params: &TlsParams, seed: u64) -> Vec<Station> {
             });
             let turn = Vector3::from_fn(|_, _| params.registration_rad * normal(&mut rng));
             let shift = Vector3::from_fn(|_, _| params.registration_m * normal(&mut rng));
-            let reach = if params.reach_m > 0.0 {
-                params.reach_m
-            } else {
-                f64::INFINITY
+            let reach = match stated.map_or(params.reach_m, |s| s.reach_m) {
+                reach if reach > 0.0 => reach,
+                _ => f64::INFINITY,
             };
             let mut station = Station {
                 number: k,
+                beam: stated.map_or(&params.beam, |s| &s.beam),
                 place,
-                step_rad: params.spacing_m * cover.sqrt() / n,
+                step_rad: stated.map_or(params.spacing_m * cover.sqrt() / n, |s| s.step_rad),
                 reach: [a - reach, a + reach],
                 error: about(&front, turn, shift + datum),
                 scale: params.scale_error * normal(&mut of_its_own(seed, u64::from(k))),
