@@ -266,7 +266,7 @@ impl Project {
             return Err(source.error(
                 at..at,
                 match raw.epochs.len() {
-                    1 => "2 [[epochs]] at least are needed, in time order; of one, `stonewise design` says what the next will show"
+                    1 => "2 [[epochs]] at least are needed, in time order; of one, `stonewise design` shows the wall and what the next will see"
                         .to_owned(),
                     _ => format!("{least_epochs} [[epochs]] at least are needed, in time order"),
                 },

@@ -118,11 +118,9 @@ impl ResultSet {
         let facade: Option<Facade> = read_json(&dir.join(FACADE))?;
         let core = read_distance_points(&dir.join(PairFile::M3c2Csv.name(pair)))?;
 
+        let facade =
+            facade.unwrap_or_else(|| facade_of(stones.iter().map(|s| (s.stone_id, s.centroid)), &outlines));
         Ok(Self {
-            facade: facade
-                .unwrap_or_else(|| facade_of(stones.iter().map(|s| (s.stone_id, s.centroid)), &outlines)),
-            stones,
-            outlines,
             pair,
             pairs: pairs_in(dir)?,
             distances: core.distances,
@@ -131,6 +129,24 @@ impl ResultSet {
             run: read_json(&dir.join(RUN))?,
             registration: read_json(&dir.join(PairFile::Registration.name(pair)))?,
             neighbours: read_neighbours(dir, pair)?,
+            ..Self::of_stones(stones, outlines, facade)
+        })
+    }
+
+    /// Stones by their ids, with their outlines and the unrolled wall, of which nothing else is known.
+    pub fn of_stones(stones: Vec<StoneRow>, outlines: BTreeMap<u32, StoneOutline>, facade: Facade) -> Self {
+        Self {
+            facade,
+            stones,
+            outlines,
+            pair: 1,
+            pairs: 0,
+            distances: Vec::new(),
+            without_distance: Vec::new(),
+            evaluation: None,
+            run: None,
+            registration: None,
+            neighbours: Vec::new(),
             verdict: None,
             trends: None,
             velocities: BTreeMap::new(),
@@ -141,7 +157,7 @@ impl ResultSet {
             remarks: Remarks::default(),
             is_signed: false,
             evidence: Evidence::default(),
-        })
+        }
     }
 
     /// What is known about the registration of the later epoch; `None` where `registration.json` is missing.

@@ -16,7 +16,7 @@ pub fn design(args: &DesignArgs, force: bool, printer: &Printer) -> Result<Outco
         &args.out,
         &owner,
         &project.inputs(),
-        &["work", "repetition"],
+        &["work", "baseline", "repetition"],
         force,
     )?;
     let design = predict(&project, args.seed, folder.path(), printer)?;

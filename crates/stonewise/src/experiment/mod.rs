@@ -3,6 +3,7 @@
 //! Every variant is an ordinary run of a project. All runs of an experiment share a store of steps, so that
 //! what variants have in common is done once, and an interrupted experiment goes on where it stopped.
 
+mod baseline;
 mod certify;
 mod design;
 mod halves;
@@ -13,6 +14,7 @@ mod sensitivity;
 mod settings_with;
 mod tune;
 
+pub use baseline::Baseline;
 pub use certify::{Certificate, CertifyOptions, Figure, certify};
 pub use design::{Design, design};
 pub use paper::{Detail, PaperOptions, PaperSurvey, PaperTables, Segmented, paper};
