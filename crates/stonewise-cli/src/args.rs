@@ -129,11 +129,12 @@ pub enum Command {
         stonewise verify results/ survey/stonewise.toml\n\n\
         The findings go to stdout. Exit codes: 0 all holds, 1 something differs, 3 something could not be compared.")]
     Verify(VerifyArgs),
-    /// Predict what the next survey will see, from the first one alone: standard deviations of every stone, the
-    /// smallest bulge that is found, what one more station gains.
+    /// Say what the first survey shows of the wall, and predict what the next one will see: standard deviations of every
+    /// stone, the smallest bulge that is found, what one more station gains. Before any survey: the same from a plan.
     #[command(
-        after_help = "Example:\n  stonewise design survey/stonewise.toml --out design/\n\n\
-        A project of one epoch is enough. The figures go to stdout as JSON."
+        after_help = "Examples:\n  stonewise design survey/stonewise.toml --out design/\n  \
+        stonewise design plan.toml --out design/\n\n\
+        A project of one epoch is enough. A plan has [wall] and [[stations]]. The figures go to stdout as JSON."
     )]
     Design(DesignArgs),
     /// Certify this program on this machine: data with published results, simulated walls, and, with a project,
@@ -514,12 +515,12 @@ pub struct VerifyArgs {
 /// Arguments of `design`.
 #[derive(Debug, ClapArgs)]
 pub struct DesignArgs {
-    /// The project file; its first epoch counts.
+    /// A project file, whose first epoch counts, or the plan of a survey: a file with the tables [wall] and [[stations]].
     pub project: PathBuf,
-    /// Folder of design.json, design.csv, design.parquet, design.html and the run; created if missing.
+    /// Folder of design.json, design.html, design.csv, design.parquet and the runs; created if missing.
     #[arg(long, value_name = "DIR", default_value = "design")]
     pub out: PathBuf,
-    /// Seed of the errors of the repetition's stations.
+    /// Seed of the errors of the repetition's stations, and of a planned wall.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 }

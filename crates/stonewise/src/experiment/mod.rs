@@ -12,6 +12,7 @@ mod paper;
 mod quiet;
 mod sensitivity;
 mod settings_with;
+mod survey_plan;
 mod tune;
 
 pub use baseline::Baseline;
@@ -19,4 +20,8 @@ pub use certify::{Certificate, CertifyOptions, Figure, certify};
 pub use design::{Design, design};
 pub use paper::{Detail, PaperOptions, PaperSurvey, PaperTables, Segmented, paper};
 pub use sensitivity::{Influence, SensitivityOptions, SensitivityPoint, sensitivity};
+pub use survey_plan::{
+    PlanDesign, PlannedInstrument, PlannedRegistration, PlannedStation, PlannedSurvey, SurveyPlan, Weakest,
+    design_plan,
+};
 pub use tune::{Dimension, DimensionError, TuneOptions, Tuned, TunedPoint, default_grid, tune};

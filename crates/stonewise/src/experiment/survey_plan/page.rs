@@ -1,0 +1,96 @@
+//! The page of a planned survey.
+
+use super::planned::PlannedSurvey;
+use super::squares::Squares;
+use crate::figure::{Axis, GREY, Item, Page, Plot, Ramp, table};
+use stonewise_core::registration::ZONE_EXTENTS_M;
+
+/// Width of a map, pixels.
+const MAP_PX: f64 = 700.0;
+
+/// The survey as planned first, then with each candidate, the best first.
+pub(super) fn page(surveys: &[(PlannedSurvey, Squares)]) -> String {
+    let mut page = Page::new("What the planned survey will see");
+    page.note(
+        "Medians over the stones of a simulated wall that stands still, one standard deviation, millimetres. The weakest \
+         square is the one whose stones are measured worst; its figure is the standard deviation of their deformation in \
+         space. In squares that are not seen, most stones are not measured.",
+    );
+    let number = |mm: Option<f64>| mm.map_or("\u{2013}".to_owned(), |mm| format!("{mm:.2}"));
+    let three = |values: [Option<f64>; 3]| values.map(number).join(" / ");
+    let name = |survey: &PlannedSurvey| match &survey.added {
+        Some(name) => format!("with {name}"),
+        None => "as planned".to_owned(),
+    };
+    let zones = ZONE_EXTENTS_M.map(|m| m.to_string()).join(" / ");
+    let rows: Vec<Vec<String>> = { surveys.iter() }
+        .map(|(survey, _)| {
+            let [stones, measured] = survey.stones;
+            let weakest = survey.weakest.map_or("\u{2013}".to_owned(), |w| {
+                format!("{:.2} at {:.1}, {:.1} m", w.sd_mm, w.along_m, w.up_m)
+            });
+            vec![
+                name(survey),
+                format!("{measured} of {stones}"),
+                weakest,
+                format!("{} of {}", survey.squares[1], survey.squares[0]),
+                three(survey.sd_mm),
+                three(survey.sd_deformation_mm),
+                three(survey.zones_mm),
+                three(survey.zones_in_face_mm),
+            ]
+        })
+        .collect();
+    page.html(&table(
+        &[
+            "stations",
+            "stones measured",
+            "weakest square",
+            "squares not seen",
+            "motion, along / up / out",
+            "deformation, along / up / out",
+            &format!("bulge of {zones} m that is found"),
+            &format!("motion in the face of a zone of {zones} m"),
+        ],
+        &rows,
+        None,
+    ));
+    let all = surveys.iter().flat_map(|(_, squares)| &squares.sd_m);
+    let largest = { all.flatten().filter(|sd| sd.is_finite()) }.fold(0.0, |a: f64, sd| a.max(1e3 * sd));
+    let ramp = Ramp {
+        range: [0.0, if largest > 0.0 { largest } else { 1.0 }],
+    };
+    for (survey, squares) in surveys {
+        page.heading(&format!("Stations {}", survey.stations.join(", ")));
+        page.html(&map(squares, ramp));
+    }
+    page.finish()
+}
+
+fn map(squares: &Squares, ramp: Ramp) -> String {
+    let end = |axis: usize| squares.size[axis] as f64 * squares.edge_m;
+    let mut map = Plot::map(
+        "standard deviation of the deformation in space; grey: not seen",
+        Axis::around("along the wall (m)", [0.0, end(0)], false),
+        Axis::around("up the face (m)", [0.0, end(1)], false),
+        MAP_PX,
+        Some((ramp, "mm".to_owned())),
+    );
+    let area = |(i, sd): (usize, &Option<f64>)| {
+        let sd_m = (*sd)?;
+        let [x, y] = [i % squares.size[0], i / squares.size[0]];
+        let corner = |dx: usize, dy: usize| [(x + dx) as f64, (y + dy) as f64].map(|v| v * squares.edge_m);
+        let colour = match sd_m.is_finite() {
+            true => ramp.colour(1e3 * sd_m),
+            false => GREY.to_owned(),
+        };
+        Some((
+            vec![corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)],
+            colour,
+        ))
+    };
+    map.add(Item::Areas(
+        squares.sd_m.iter().enumerate().filter_map(area).collect(),
+    ));
+    map.svg()
+}

@@ -1,0 +1,292 @@
+//! The file of a planned survey: a plain model of the wall, instruments, and stations.
+
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::path::Path;
+use stonewise_simulate::{BeamParams, StationPlace, WallParams};
+
+/// A wall that is not surveyed yet, and the stations that may survey it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SurveyPlan {
+    /// The wall, as the simulator builds it.
+    pub wall: WallParams,
+    /// How well stations are brought into one frame.
+    #[serde(default)]
+    pub registration: PlannedRegistration,
+    /// Edge of the squares of which the weakest is looked for, metres.
+    #[serde(default = "square_m")]
+    pub square_m: f64,
+    /// Instruments that stations name.
+    #[serde(default)]
+    pub instruments: Vec<PlannedInstrument>,
+    /// Stations, those that are only candidates among them.
+    pub stations: Vec<PlannedStation>,
+}
+
+fn square_m() -> f64 {
+    1.0
+}
+
+/// How well stations are brought into one frame, one standard deviation per axis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlannedRegistration {
+    /// Shift of a station, metres.
+    pub shift_m: f64,
+    /// Rotation of a station about the part of the wall in front of it, radians.
+    pub rotation_rad: f64,
+}
+
+impl Default for PlannedRegistration {
+    fn default() -> Self {
+        Self {
+            shift_m: 0.0003,
+            rotation_rad: 2e-5,
+        }
+    }
+}
+
+/// A class of scanner.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlannedInstrument {
+    /// What stations call it.
+    pub name: String,
+    /// Range noise at 10 m, square on, metres.
+    #[serde(default = "range_noise_m")]
+    pub range_noise_m: f64,
+    /// Growth of the range noise beyond 10 m, metres per metre.
+    #[serde(default = "range_noise_per_m")]
+    pub range_noise_per_m: f64,
+    /// Angle noise across the beam, radians.
+    #[serde(default = "angle_noise_rad")]
+    pub angle_noise_rad: f64,
+    /// Diameter of the beam where it leaves the scanner, metres.
+    #[serde(default = "spot_m")]
+    pub spot_m: f64,
+    /// Half angle by which the beam widens, radians.
+    #[serde(default = "divergence_rad")]
+    pub divergence_rad: f64,
+    /// Angle between neighbouring beams, radians.
+    #[serde(default = "step_rad")]
+    pub step_rad: f64,
+}
+
+fn range_noise_m() -> f64 {
+    BeamParams::terrestrial().range_noise_m
+}
+
+fn range_noise_per_m() -> f64 {
+    BeamParams::terrestrial().range_noise_per_m
+}
+
+fn angle_noise_rad() -> f64 {
+    BeamParams::terrestrial().pointing_noise_rad
+}
+
+fn spot_m() -> f64 {
+    2.0 * BeamParams::terrestrial().exit_radius_m
+}
+
+fn divergence_rad() -> f64 {
+    BeamParams::terrestrial().divergence_rad
+}
+
+fn step_rad() -> f64 {
+    StationPlace::default().step_rad
+}
+
+/// A place from which the wall is or may be scanned.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlannedStation {
+    /// Its name.
+    pub name: String,
+    /// Place along the wall from its left end, for a viewer in front, metres.
+    pub along_m: f64,
+    /// Distance from the face, metres.
+    pub distance_m: f64,
+    /// Height of the scanner over ground, metres.
+    #[serde(default = "height_m")]
+    pub height_m: f64,
+    /// How far to either side it scans, metres; 0 for all of the wall.
+    #[serde(default)]
+    pub reach_m: f64,
+    /// Its instrument; absent: the first, or a terrestrial scanner of 1.5 mm where none is named.
+    #[serde(default)]
+    pub instrument: Option<String>,
+    /// Whether the station is one of those that the survey may get in addition.
+    #[serde(default)]
+    pub candidate: bool,
+}
+
+fn height_m() -> f64 {
+    StationPlace::default().height_m
+}
+
+impl SurveyPlan {
+    /// Whether a file is a plan: it has a table `[wall]` and no `[project]`.
+    pub fn is_in(path: &Path) -> bool {
+        let text = std::fs::read_to_string(path).ok();
+        let table = text.and_then(|text| text.parse::<toml::Table>().ok());
+        table.is_some_and(|t| t.contains_key("wall") && !t.contains_key("project"))
+    }
+
+    /// Reads a plan.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no TOML, or holds a key that is not known or a value that cannot be; the error names the
+    /// key and the fix.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(Error::io("reading the plan", path))?;
+        let input = |message: String| Error::Input {
+            path: path.to_owned(),
+            message,
+        };
+        let plan: Self = toml::from_str(&text).map_err(|e| input(e.to_string()))?;
+        plan.check().map_err(input)?;
+        Ok(plan)
+    }
+
+    fn check(&self) -> std::result::Result<(), String> {
+        let positive = |key: String, value: f64| match value.is_finite() && value > 0.0 {
+            true => Ok(()),
+            false => Err(format!("{key} = {value}: a positive number is needed")),
+        };
+        positive("square_m".to_owned(), self.square_m)?;
+        let not_negative = |key: String, value: f64| match value.is_finite() && value >= 0.0 {
+            true => Ok(()),
+            false => Err(format!("{key} = {value}: a number is needed, 0 or larger")),
+        };
+        not_negative("registration.shift_m".to_owned(), self.registration.shift_m)?;
+        not_negative(
+            "registration.rotation_rad".to_owned(),
+            self.registration.rotation_rad,
+        )?;
+        for i in &self.instruments {
+            let key = |name: &str| format!("{name} of instrument {:?}", i.name);
+            positive(key("step_rad"), i.step_rad)?;
+            not_negative(key("range_noise_m"), i.range_noise_m)?;
+            not_negative(key("range_noise_per_m"), i.range_noise_per_m)?;
+            not_negative(key("angle_noise_rad"), i.angle_noise_rad)?;
+            not_negative(key("spot_m"), i.spot_m)?;
+            not_negative(key("divergence_rad"), i.divergence_rad)?;
+        }
+        let mut names = BTreeSet::new();
+        for s in &self.stations {
+            if !names.insert(&s.name) {
+                return Err(format!("two stations are called {:?}: rename one", s.name));
+            }
+            if s.name.is_empty() || !s.name.chars().all(|c| c.is_alphanumeric() || "-_".contains(c)) {
+                return Err(format!(
+                    "station {:?}: results lie in a folder of this name; take letters, digits, - and _",
+                    s.name
+                ));
+            }
+            let key = |name: &str| format!("{name} of station {:?}", s.name);
+            positive(key("distance_m"), s.distance_m)?;
+            not_negative(key("reach_m"), s.reach_m)?;
+            if !(s.along_m.is_finite() && s.height_m.is_finite()) {
+                return Err(format!("station {:?}: its place is no number", s.name));
+            }
+            if let Some(name) = &s.instrument {
+                if !self.instruments.iter().any(|i| i.name == *name) {
+                    return Err(format!(
+                        "station {:?} names the instrument {name:?}, which no [[instruments]] describes",
+                        s.name
+                    ));
+                }
+            }
+        }
+        match self.stations.iter().any(|s| !s.candidate) {
+            true => Ok(()),
+            false => Err("at least one of the [[stations]] must be no candidate".to_owned()),
+        }
+    }
+
+    /// A station as the simulator places it.
+    pub fn place(&self, station: &PlannedStation) -> StationPlace {
+        let named = |i: &&PlannedInstrument| station.instrument.as_ref().is_none_or(|name| i.name == *name);
+        let mut place = StationPlace {
+            along_m: station.along_m - 0.5 * self.wall.width_m,
+            distance_m: station.distance_m,
+            height_m: station.height_m,
+            reach_m: station.reach_m,
+            ..StationPlace::default()
+        };
+        if let Some(instrument) = self.instruments.iter().find(named) {
+            place.step_rad = instrument.step_rad;
+            place.beam = BeamParams {
+                range_noise_m: instrument.range_noise_m,
+                range_noise_per_m: instrument.range_noise_per_m,
+                pointing_noise_rad: instrument.angle_noise_rad,
+                exit_radius_m: 0.5 * instrument.spot_m,
+                divergence_rad: instrument.divergence_rad,
+                ..BeamParams::terrestrial()
+            };
+        }
+        place
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLAN: &str = "
+        [wall]
+        width_m = 10.0
+        [[instruments]]
+        name = \"far\"
+        spot_m = 0.01
+        step_rad = 0.001
+        [[stations]]
+        name = \"A\"
+        along_m = 2.0
+        distance_m = 8.0
+        [[stations]]
+        name = \"B\"
+        along_m = 9.0
+        distance_m = 6.0
+        candidate = true
+    ";
+
+    #[test]
+    fn stations_count_from_the_left_end_and_take_the_first_instrument() {
+        let plan: SurveyPlan = toml::from_str(PLAN).unwrap();
+        plan.check().unwrap();
+        let place = plan.place(&plan.stations[0]);
+        assert_eq!((place.along_m, place.distance_m), (-3.0, 8.0));
+        assert_eq!((place.step_rad, place.beam.exit_radius_m), (0.001, 0.005));
+        assert_eq!(place.beam.range_noise_m, BeamParams::terrestrial().range_noise_m);
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_by_its_name() {
+        let refused = |from: &str, to: &str, named: &str| {
+            let plan = toml::from_str::<SurveyPlan>(&PLAN.replace(from, to));
+            let message = match plan {
+                Ok(plan) => plan.check().unwrap_err(),
+                Err(error) => error.to_string(),
+            };
+            assert!(message.contains(named), "{message}");
+        };
+        refused("\"B\"", "\"A\"", "\"A\": rename one");
+        refused("\"A\"", "\"../A\"", "letters, digits");
+        refused(
+            "distance_m = 8.0",
+            "distance_m = -8.0",
+            "distance_m of station \"A\" = -8",
+        );
+        refused(
+            "step_rad = 0.001",
+            "step_rad = 0.0",
+            "step_rad of instrument \"far\"",
+        );
+        refused("candidate", "instrument = \"near\"\ncandidate", "\"near\"");
+        refused("along_m = 2.0", "along_m = 2.0\ncandidate = true", "no candidate");
+        refused("spot_m", "dot_m", "dot_m");
+    }
+}
