@@ -106,7 +106,8 @@ pub enum Command {
     /// Compare clouds along their normals (Lague et al. 2013).
     #[command(
         after_help = "Examples:\n  stonewise m3c2 survey/stonewise.toml --out results/\n  \
-        stonewise m3c2 before.laz after.laz --out results/ --params m3c2_params.txt"
+        stonewise m3c2 before.laz after.laz --out results/ --params m3c2_params.txt\n  \
+        stonewise m3c2 before.laz after.laz --out results/ --recipes"
     )]
     M3c2(CompareArgs),
     /// Distance from each point of the second cloud to the nearest of the first.
@@ -392,6 +393,9 @@ pub struct CompareArgs {
     /// M3C2 parameter file saved by CloudCompare (only for m3c2 of two clouds).
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
+    /// Also write files with which CloudCompare and PDAL repeat M3C2 (only for m3c2).
+    #[arg(long)]
+    pub recipes: bool,
     /// Largest distance, metres; points farther away get none (c2c and c2m).
     #[arg(long, value_name = "M", default_value_t = 1.0)]
     pub max_distance: f64,

@@ -16,7 +16,10 @@ pub fn m3c2(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcom
     if let Some(params) = params {
         project.settings.m3c2 = params;
     }
-    compare(&project, Comparison::M3c2, args, force, printer)
+    let what = Comparison::M3c2 {
+        recipes: args.recipes,
+    };
+    compare(&project, what, args, force, printer)
 }
 
 /// C2C of a project or of two clouds.
@@ -69,7 +72,16 @@ fn claim(project: &Project, args: &CompareArgs, force: bool) -> Result<OutputFol
     Ok(match args.inputs.as_slice() {
         [_] => OutputFolder::of_project(&args.out, project, force)?,
         clouds => {
-            let written = ["m3c2.laz", "m3c2.csv", "c2c.laz", "c2m.laz", "work"];
+            let written = [
+                "m3c2.laz",
+                "m3c2.csv",
+                "m3c2_cloudcompare.txt",
+                "m3c2_cloudcompare.sh",
+                "m3c2_pdal.json",
+                "c2c.laz",
+                "c2m.laz",
+                "work",
+            ];
             OutputFolder::of_inputs(
                 &args.out,
                 &Owner::inputs("clouds", clouds),

@@ -2,6 +2,7 @@
 
 use crate::change::M3c2Params;
 use crate::params::{ParamError, Params};
+use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
 /// Why a CloudCompare parameter file cannot be used.
@@ -80,6 +81,42 @@ pub fn params_from_cloudcompare(text: &str) -> Result<M3c2Params, CloudCompareEr
     };
     params.check()?;
     Ok(params)
+}
+
+/// The text of the file with which CloudCompare repeats a comparison on given core points: [`params_from_cloudcompare`]
+/// reads the same parameters back, except that CloudCompare divides variances by n (`ddof` 0).
+///
+/// CloudCompare turns every normal to one side of one axis: that of the largest component of `outward`. Cylinders are
+/// searched at once, as here, and not progressively.
+pub fn params_to_cloudcompare(params: &M3c2Params, outward: &Vector3<f64>) -> String {
+    let axis = outward.iamax();
+    // +X, -X, +Y, -Y, +Z, -Z.
+    let orientation = 2 * axis + usize::from(outward[axis] < 0.0);
+    let entries = [
+        ("M3C2VER", "1".to_owned()),
+        ("NormalScale", (2.0 * params.normal_radius_m).to_string()),
+        ("NormalMode", "0".to_owned()),
+        ("NormalUseCorePoints", "false".to_owned()),
+        ("NormalPreferedOri", orientation.to_string()),
+        ("SearchScale", (2.0 * params.cylinder_radius_m).to_string()),
+        ("SearchDepth", params.max_depth_m.to_string()),
+        ("SubsampleRadius", params.core_spacing_m.to_string()),
+        ("SubsampleEnabled", "true".to_owned()),
+        ("RegistrationError", params.registration_error_m.to_string()),
+        ("RegistrationErrorEnabled", "true".to_owned()),
+        ("UseSinglePass4Depth", "true".to_owned()),
+        ("PositiveSearchOnly", "false".to_owned()),
+        ("UseMedian", params.robust.to_string()),
+        ("UseMinPoints4Stat", "true".to_owned()),
+        ("MinPoints4Stat", params.min_points.to_string()),
+        ("ProjDestIndex", "2".to_owned()),
+        ("UseOriginalCloud", "false".to_owned()),
+        ("ExportStdDevInfo", "true".to_owned()),
+        ("ExportDensityAtProjScale", "true".to_owned()),
+        ("UsePrecisionMaps", "false".to_owned()),
+    ];
+    let lines = entries.map(|(key, value)| format!("{key}={value}\n"));
+    format!("[General]\n{}", lines.concat())
 }
 
 /// The [General] section: key to line number and value.
@@ -184,6 +221,23 @@ mod tests {
         assert_eq!((params.registration_error_m, params.core_spacing_m), (0.0, 0.05));
         let counted = FILE.replace("UseMinPoints4Stat=false", "UseMinPoints4Stat=true");
         assert_eq!(params_from_cloudcompare(&counted).unwrap().min_points, 9);
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let params = M3c2Params {
+            normal_radius_m: 0.3,
+            cylinder_radius_m: 0.07,
+            max_depth_m: 0.45,
+            core_spacing_m: 0.11,
+            robust: true,
+            min_points: 8,
+            ddof: 0,
+            registration_error_m: 0.0015,
+        };
+        let text = params_to_cloudcompare(&params, &Vector3::new(0.1, -0.9, 0.2));
+        assert_eq!(params_from_cloudcompare(&text), Ok(params));
+        assert!(text.contains("\nNormalPreferedOri=3\n"), "{text}");
     }
 
     #[test]

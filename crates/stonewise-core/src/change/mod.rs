@@ -21,7 +21,7 @@ mod triangle;
 
 pub use c2c::c2c;
 pub use c2m::{MeshIndex, c2m};
-pub use cloudcompare::{CloudCompareError, params_from_cloudcompare};
+pub use cloudcompare::{CloudCompareError, params_from_cloudcompare, params_to_cloudcompare};
 pub use clouds::{CoreNormals, m3c2_clouds};
 pub use core_points::{CorePoint, thin_to_voxels};
 pub use error::CompareError;

@@ -7,6 +7,7 @@ use crate::pipeline::context::Context;
 use crate::pipeline::graph::{Run, Task};
 use crate::pipeline::outputs::crs::coordinate_system;
 use crate::pipeline::outputs::m3c2::write_m3c2;
+use crate::pipeline::outputs::m3c2_recipes::write_m3c2_recipes;
 use crate::pipeline::steps::ingest::{INGEST, Ingested, scanners};
 use crate::pipeline::steps::m3c2::{change_field, m3c2};
 use crate::pipeline::until::Until;
@@ -36,7 +37,10 @@ const CELL_M: f64 = 0.25;
 #[derive(Clone, Copy, Debug)]
 pub enum Comparison<'a> {
     /// Epochs along the normals of the first: `m3c2.laz`, `m3c2.csv`.
-    M3c2,
+    M3c2 {
+        /// Whether to write files with which CloudCompare and PDAL repeat it.
+        recipes: bool,
+    },
     /// Each point of the second epoch with the nearest of the first: `c2c.laz` with `c2c_distance`.
     C2c {
         /// Farther points have no distance, metres.
@@ -68,7 +72,7 @@ pub fn compare_clouds(
     let later = EpochId::at(1);
     let mut context = Context::new(project, folder, progress)?;
     context.agenda = match what {
-        Comparison::M3c2 => agenda(project, &[EpochId::REFERENCE, later], M3C2, "M3C2"),
+        Comparison::M3c2 { .. } => agenda(project, &[EpochId::REFERENCE, later], M3C2, "M3C2"),
         Comparison::C2c { .. } => agenda(project, &[EpochId::REFERENCE, later], C2C, "C2C"),
         Comparison::C2m { .. } => agenda(project, &[later], C2M, "C2M"),
     };
@@ -76,7 +80,7 @@ pub fn compare_clouds(
     let run = Run::new(&context, Until::Compared);
     let out = folder.path();
     match what {
-        Comparison::M3c2 => {
+        Comparison::M3c2 { recipes } => {
             let first = run.clouds(later)?.first;
             let views = views_of(project)?;
             let centres: Vec<Point3<f64>> = views.iter().map(View::centre).collect();
@@ -90,6 +94,10 @@ pub fn compare_clouds(
             };
             let change = change_field(&context.in_line(M3C2, || m3c2(&run, later, &outward))?)?;
             write_m3c2(out, later, coordinate_system(project)?.as_ref(), &change)?;
+            if recipes {
+                let clouds = [EpochId::REFERENCE, later].map(|epoch| project.epochs[epoch].clouds.as_slice());
+                write_m3c2_recipes(out, clouds, &project.settings.m3c2, &change)?;
+            }
         }
         Comparison::C2c { max_m } => {
             let Pair { first, later } = run.clouds(later)?;

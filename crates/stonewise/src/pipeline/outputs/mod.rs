@@ -10,6 +10,7 @@ pub mod evidence;
 pub mod face_cloud;
 pub mod instruments;
 pub mod m3c2;
+pub mod m3c2_recipes;
 pub mod outlines;
 pub mod report;
 pub mod run_record;
