@@ -33,6 +33,8 @@ use stonewise_simulate::{
     write_survey,
 };
 
+/// How far a station may stand off its planned place, metres.
+const PLACEMENT_M: f64 = 0.2;
 /// Distance of the photos from the face and from each other along and up, metres.
 const PHOTO_M: [f64; 3] = [8.0, 4.0, 3.0];
 
@@ -148,6 +150,7 @@ fn scene(plan: &SurveyPlan, added: Option<&PlannedStation>, seed: u64) -> SceneP
         tls: Some(TlsParams {
             registration_m: plan.registration.shift_m,
             registration_rad: plan.registration.rotation_rad,
+            placement_m: PLACEMENT_M,
             places: stations(plan, added).map(|s| plan.place(s)).collect(),
             ..TlsParams::default()
         }),
