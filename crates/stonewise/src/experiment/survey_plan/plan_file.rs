@@ -191,13 +191,13 @@ impl SurveyPlan {
             if !(s.along_m.is_finite() && s.height_m.is_finite()) {
                 return Err(format!("station {:?}: its place is no number", s.name));
             }
-            if let Some(name) = &s.instrument {
-                if !self.instruments.iter().any(|i| i.name == *name) {
-                    return Err(format!(
-                        "station {:?} names the instrument {name:?}, which no [[instruments]] describes",
-                        s.name
-                    ));
-                }
+            if let Some(name) = &s.instrument
+                && !self.instruments.iter().any(|i| i.name == *name)
+            {
+                return Err(format!(
+                    "station {:?} names the instrument {name:?}, which no [[instruments]] describes",
+                    s.name
+                ));
             }
         }
         match self.stations.iter().any(|s| !s.candidate) {

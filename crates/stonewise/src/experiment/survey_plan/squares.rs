@@ -33,7 +33,8 @@ pub struct Squares {
 }
 
 impl Squares {
-    /// Which stones of the wall lie in which square, and how well they are measured.
+    /// Which stones of the wall lie in which square, and how well they are measured. Cost: O(stones of the wall times
+    /// measured stones).
     pub fn new(wall: &Wall, edge_m: f64, measured: &[(&StoneRow, &RowMotion)]) -> Self {
         let sized = |v: f64| (v / edge_m).ceil().clamp(1.0, 1e4) as usize;
         let params = wall.params();
@@ -44,14 +45,23 @@ impl Squares {
             y as usize * size[0] + x as usize
         };
         let above_ground = |s: &&SimStone| s.bounds[3] > 0.0;
+        let middles: Vec<[f64; 2]> = { wall.stones.iter() }
+            .filter(above_ground)
+            .map(|s| s.middle)
+            .collect();
         let mut count = vec![0; size[0] * size[1]];
         let mut sds: Vec<Vec<f64>> = vec![Vec::new(); count.len()];
-        for stone in wall.stones.iter().filter(above_ground) {
-            count[square(stone.middle[0], stone.middle[1])] += 1;
+        for [a, u] in &middles {
+            count[square(*a, *u)] += 1;
         }
         for (row, motion) in measured {
+            // What is seen of a stone may have its middle on the other side of a border.
             let place = wall.face.face_of(&row.centroid);
-            sds[square(place.a, place.u)].push(in_space(motion));
+            let distance = |m: &[f64; 2]| (m[0] - place.a).hypot(m[1] - place.u);
+            let nearest = { middles.iter() }.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            if let Some([a, u]) = nearest {
+                sds[square(*a, *u)].push(in_space(motion));
+            }
         }
         Self {
             edge_m,
@@ -119,6 +129,7 @@ fn middle(mut values: Vec<f64>, count: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{Point3, Vector3};
     use stonewise_simulate::WallParams;
 
     #[test]
@@ -141,8 +152,10 @@ mod tests {
             .map(|s| {
                 // Worse to the right and towards the top; nothing is measured at the left end.
                 let sd = 1e-4 * (3.0 + s.middle[0]) * (1.0 + s.middle[1]);
+                // Most of the stone may be hidden: its points lie off its middle.
+                let up = Vector3::z() * 0.02;
                 let row = StoneRow {
-                    centroid: s.world_from_stone.translation.vector.into(),
+                    centroid: Point3::from(s.world_from_stone.translation.vector + up),
                     ..StoneRow::default()
                 };
                 let motion = RowMotion {
