@@ -17,6 +17,7 @@ mod evaluate;
 mod field;
 mod hypothesis;
 mod iteration;
+mod joins;
 mod joint;
 pub(crate) mod joint_motions;
 mod neighbour_covariances;

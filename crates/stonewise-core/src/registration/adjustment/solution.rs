@@ -161,7 +161,7 @@ impl Adjustment {
             Some(equations) => self.problem(equations.iter()),
             None => self.problem(solution.equations.iter().map(|e| &e.with_field)),
         };
-        let Some(crack) = find_crack(&problem, &solution.field) else {
+        let Some(crack) = find_crack(&problem, &solution.field, |side| self.smallest_jump_m(side)) else {
             return false;
         };
         self.prior.part_along(crack);

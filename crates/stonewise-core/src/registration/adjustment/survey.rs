@@ -27,6 +27,8 @@ pub(crate) struct StoneInfo {
     pub noise_factors: [f64; 2],
     /// How much less of its face one epoch shows than is usual, or than points show well, as a share.
     pub hidden: f64,
+    /// Sources of each epoch's points, with the share of each; none where the points were not chosen by a window.
+    pub sources: [Vec<(u32, f64)>; 2],
 }
 
 /// All pairs, with and without their points.
@@ -133,9 +135,19 @@ impl StoneInfo {
             counts,
             noise_factors: [1.0; 2],
             hidden: 0.0,
+            sources: pair.window.as_deref().map_or_else(Default::default, shares),
             usable: counts.iter().all(|&n| n >= params.min_points),
         }
     }
+}
+
+/// Share of each source in each epoch's points.
+fn shares(window: &Window) -> [Vec<(u32, f64)>; 2] {
+    window.sources().each_ref().map(|counts| {
+        let all: usize = counts.values().sum();
+        let share = |(source, count): (&u32, &usize)| (*source, *count as f64 / all.max(1) as f64);
+        counts.iter().map(share).collect()
+    })
 }
 
 /// Compares the noise of stones that sources of another sensor measured with that of most stones: sources whose
@@ -151,7 +163,7 @@ fn set_noise_factors(stones: &mut [StoneInfo], windows: &[Option<Arc<Window>>]) 
         // Per source, stones of usual noise less the others.
         let mut votes: BTreeMap<u32, i64> = BTreeMap::new();
         for w in windows.iter().flatten() {
-            for source in &w.sources()[epoch] {
+            for source in w.sources()[epoch].keys() {
                 *votes.entry(*source).or_default() += if is_usual(w) { 1 } else { -1 };
             }
         }
@@ -160,7 +172,7 @@ fn set_noise_factors(stones: &mut [StoneInfo], windows: &[Option<Arc<Window>>]) 
             if let Some(w) = window.as_deref()
                 && !is_usual(w)
                 && factor(w) > 0.0
-                && w.sources()[epoch].iter().all(is_of_another)
+                && w.sources()[epoch].keys().all(is_of_another)
             {
                 stone.noise_factors[epoch] = factor(w);
             }

@@ -12,6 +12,7 @@ use super::near_point::NearPoint;
 use super::window::Window;
 use crate::geometry::FaceFrame;
 use nalgebra::Vector3;
+use std::collections::BTreeMap;
 
 /// The points of a stone, chosen from all points near it, and the window in which they count.
 #[derive(Clone, Debug)]
@@ -44,8 +45,11 @@ pub fn stone_points(
     let near = near.map(|near| of_best_sensor(near, &face_from_world));
     let [first, second] = near.each_ref().map(|near| labelled(near));
     let sources = near.each_ref().map(|near| {
-        let own = near.iter().filter(|p| p.labelled);
-        own.map(|p| p.source).collect()
+        let mut counts = BTreeMap::new();
+        for point in near.iter().filter(|p| p.labelled) {
+            *counts.entry(point.source).or_default() += 1;
+        }
+        counts
     });
 
     match Window::new([&first, &second], normal, shift, border_noises, sources) {

@@ -3,7 +3,7 @@
 use super::noise::noise_m;
 use crate::geometry::{FaceFrame, OutlineParams, RingIndex, outlines, signed_area};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 /// Share of a stone's points, at either end of their depths, that does not set how deep the stone reaches:
 /// mixed pixels and what hangs in front of the stone.
@@ -29,8 +29,8 @@ pub struct Window {
     depths: [[f64; 2]; 2],
     /// Noise of each epoch's points, metres.
     noise_m: [f64; 2],
-    /// The sources of each epoch's labelled points.
-    sources: [BTreeSet<u32>; 2],
+    /// Sources of each epoch's labelled points, with the number of points of each.
+    sources: [BTreeMap<u32, usize>; 2],
     /// Share of the labelled points that lie inside the other epoch's outlines, of the epoch in which it is less.
     shared: f64,
 }
@@ -41,7 +41,7 @@ impl Window {
         normal: &Vector3<f64>,
         shift: &Vector3<f64>,
         border_noises: f64,
-        sources: [BTreeSet<u32>; 2],
+        sources: [BTreeMap<u32, usize>; 2],
     ) -> Option<Self> {
         if border_noises <= 0.0 {
             return None;
@@ -84,8 +84,8 @@ impl Window {
         self.shared
     }
 
-    /// The sources of each epoch's labelled points.
-    pub(crate) fn sources(&self) -> &[BTreeSet<u32>; 2] {
+    /// Sources of each epoch's labelled points, with the number of points of each.
+    pub(crate) fn sources(&self) -> &[BTreeMap<u32, usize>; 2] {
         &self.sources
     }
 

@@ -35,16 +35,19 @@ const SIDE_STONES: usize = 10;
 const TESTED: usize = 150;
 /// Probability of finding a line, anywhere, in a wall without one.
 const FALSE_ALARM: f64 = 1e-4;
-/// Smaller jumps cannot be distinguished from how scans join, metres: stations of a terrestrial survey are registered
-/// to a millimetre.
-const SMALLEST_M: f64 = 1.5e-3;
 /// Turns, in steps between directions, by which the best line is refined.
 const TURNS: [f64; 5] = [0.0, -0.33, 0.33, -0.66, 0.66];
 /// Shifts, in steps between parallel lines, by which the best line is refined.
 const SHIFTS: [f64; 3] = [0.0, -0.5, 0.5];
 
 /// Finds the most significant line; `None` where no line is beyond chance.
-pub(crate) fn find_crack(problem: &FieldProblem, field: &Field) -> Option<Crack> {
+///
+/// `smallest_m`: the smallest jump between two sides that counts, metres.
+pub(crate) fn find_crack(
+    problem: &FieldProblem,
+    field: &Field,
+    smallest_m: impl Fn(&[bool]) -> f64,
+) -> Option<Crack> {
     let graph = problem.graph;
     let chart = unrolled(graph);
     let mut lengths: Vec<f64> = graph.edges.iter().map(|e| e.length_m).collect();
@@ -68,8 +71,10 @@ pub(crate) fn find_crack(problem: &FieldProblem, field: &Field) -> Option<Crack>
     let (line, _) = most_significant(&first, &chart, problem)?;
     let (line, found) = most_significant(&line.neighbours(pitch), &chart, problem)?;
     let limit = ChiSquared::new(3.0).ok()?.inverse_cdf(1.0 - FALSE_ALARM / tried);
-    (found.excess > limit && found.jump.norm() > SMALLEST_M).then(|| Crack {
-        side: line.sides(&chart),
+    let side = line.sides(&chart);
+    let counts = found.excess > limit && found.jump.norm() > smallest_m(&side);
+    counts.then_some(Crack {
+        side,
         jump: found.jump,
     })
 }
@@ -213,7 +218,7 @@ mod tests {
         let jump = Vector3::new(0.0, 0.006, 0.004);
         let (wall, side) = wall(jump, 1);
         let problem = wall.problem(1.0);
-        let found = find_crack(&problem, &solve(&problem).unwrap()).unwrap();
+        let found = find_crack(&problem, &solve(&problem).unwrap(), |_| 0.0015).unwrap();
         let agreeing = found.side.iter().zip(&side).filter(|(a, b)| a == b).count();
         let (share, jump) = match agreeing > 30 {
             true => (agreeing, jump),
@@ -228,7 +233,7 @@ mod tests {
         for seed in 0..6 {
             let (wall, _) = wall(Vector3::zeros(), seed);
             let problem = wall.problem(1.0);
-            assert!(find_crack(&problem, &solve(&problem).unwrap()).is_none());
+            assert!(find_crack(&problem, &solve(&problem).unwrap(), |_| 0.0).is_none());
         }
     }
 
