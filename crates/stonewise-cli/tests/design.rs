@@ -144,7 +144,7 @@ fn the_candidate_that_sees_the_rest_of_a_planned_wall_comes_first() {
     assert_eq!(unseen(&design["with_candidate"][0]), 0, "{design}");
     assert!(unseen(&design["with_candidate"][1]) > 0, "{design}");
     assert!(out.join("design.html").exists());
-    // A folder of other people is left alone.
+    // A folder that holds other files is left as it is.
     let mut command = stonewise();
     command.args(["design", "--quiet"]).arg(&plan);
     assert!(

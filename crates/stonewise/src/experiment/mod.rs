@@ -9,6 +9,7 @@ mod design;
 mod halves;
 mod known_motion;
 mod paper;
+mod predicted;
 mod quiet;
 mod sensitivity;
 mod settings_with;

@@ -18,6 +18,9 @@ impl Adjustment {
     /// shares change between neighbours on the two sides, in the mean along the line. Where an epoch has fewer than two
     /// sources, its file may have been joined from several, and any line may be a seam.
     pub fn smallest_jump_m(&self, side: &[bool]) -> f64 {
+        if (0..2).any(|epoch| self.sources(epoch) < 2) {
+            return AT_SEAM_M;
+        }
         let mut changes: [BTreeMap<u32, f64>; 2] = Default::default();
         let mut crossing = 0.0;
         for edge in &self.prior.graph.edges {
@@ -36,9 +39,6 @@ impl Adjustment {
                     }
                 }
             }
-        }
-        if (0..2).any(|epoch| self.sources(epoch) < 2) {
-            return AT_SEAM_M;
         }
         let squares = changes
             .iter()

@@ -12,6 +12,7 @@ mod table;
 use crate::error::{Error, Result};
 use crate::experiment::baseline::{InventoryStone, baseline};
 use crate::experiment::halves::halves_of;
+use crate::experiment::predicted::{limits_mm, medians_mm};
 use crate::experiment::quiet::Quiet;
 use crate::files::{write_readable_json, write_text};
 use crate::pipeline::{Context, Run, Until};
@@ -30,8 +31,6 @@ use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::FaceFrame;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
-use stonewise_core::registration::Deformation;
-use stonewise_core::statistics::median;
 use stonewise_io::table::{write_csv, write_parquet};
 use table::stone_table;
 
@@ -115,17 +114,7 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
         ));
     }
 
-    let medians = |of: &dyn Fn(&Expected, usize) -> Option<f64>| {
-        [0, 1, 2].map(|axis| {
-            let mut values: Vec<f64> = found.iter().filter_map(|e| of(e, axis)).collect();
-            median(&mut values).map(|sd| 1e3 * sd)
-        })
-    };
-
-    let limits_mm = |of: &dyn Fn(&Deformation) -> [Option<f64>; 3]| {
-        let limits_m = registered.deformation.as_ref().map_or([None; 3], of);
-        limits_m.map(|limit| limit.map(|m| 1e3 * m))
-    };
+    let deformation = registered.deformation.as_ref();
     let design = Design {
         epoch: project.epochs.reference().name.clone(),
         seed,
@@ -138,13 +127,13 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
             },
         ),
         datum: measured.datum.state,
-        sd_mm: medians(&|e, axis| Some(e.sd[axis])),
-        sd_deformation_mm: medians(&|e, axis| e.deformation[axis]),
-        zones_mm: limits_mm(&|d| d.detection_limits_m),
-        zones_in_face_mm: limits_mm(&|d| d.limits_in_face_m),
+        sd_mm: medians_mm(&found, |e, axis| Some(e.sd[axis])),
+        sd_deformation_mm: medians_mm(&found, |e, axis| e.deformation[axis]),
+        zones_mm: limits_mm(deformation, |d| d.detection_limits_m),
+        zones_in_face_mm: limits_mm(deformation, |d| d.limits_in_face_m),
         sources,
-        sd_with_one_more_mm: medians(&|e, axis| Some(e.one_more[axis])),
-        sd_without_registration_mm: medians(&|e, axis| Some(e.without_registration[axis])),
+        sd_with_one_more_mm: medians_mm(&found, |e, axis| Some(e.one_more[axis])),
+        sd_without_registration_mm: medians_mm(&found, |e, axis| Some(e.without_registration[axis])),
         baseline,
     };
 

@@ -2,6 +2,7 @@
 
 use super::expected::{Design, Foreseen};
 use crate::experiment::baseline::Baseline;
+use crate::experiment::predicted::in_table;
 use crate::figure::{Axis, GREY, Item, Page, Plot, Ramp, table};
 use stonewise_core::registration::ZONE_EXTENTS_M;
 
@@ -17,10 +18,9 @@ pub(super) fn page(design: &Design, stones: &[Foreseen]) -> String {
          Registration: {}. Medians over these stones, millimetres, one standard deviation.",
         design.epoch, design.datum
     ));
-    let number = |mm: Option<f64>| mm.map_or("\u{2013}".to_owned(), |mm| format!("{mm:.2}"));
     let row = |name: String, values: [Option<f64>; 3]| {
         std::iter::once(name)
-            .chain(values.map(number))
+            .chain(values.map(in_table))
             .collect::<Vec<_>>()
     };
     let rows = [
@@ -47,7 +47,7 @@ pub(super) fn page(design: &Design, stones: &[Foreseen]) -> String {
     ));
     let limits = design.zones_mm.iter().zip(design.zones_in_face_mm);
     let zones: Vec<Vec<String>> = { ZONE_EXTENTS_M.iter().zip(limits) }
-        .map(|(extent, (out, in_face))| vec![format!("{extent} m"), number(*out), number(in_face)])
+        .map(|(extent, (out, in_face))| vec![format!("{extent} m"), in_table(*out), in_table(in_face)])
         .collect();
     page.heading("Smallest motion of a zone that is found in 95 of 100 cases")
         .html(&table(

@@ -10,6 +10,7 @@ mod planned;
 mod squares;
 
 use crate::error::{Error, Result};
+use crate::experiment::predicted::{limits_mm, medians_mm};
 use crate::experiment::quiet::Quiet;
 use crate::files::{write_readable_json, write_text};
 use crate::pipeline::{Context, Run, Until};
@@ -26,8 +27,6 @@ use std::path::Path;
 use std::sync::Arc;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::progress::Progress;
-use stonewise_core::registration::Deformation;
-use stonewise_core::statistics::median;
 use stonewise_simulate::{
     MaskFiles, PhotoParams, SceneParams, SimulateError, SurroundingsParams, SurveyParams, TlsParams, Wall,
     write_survey,
@@ -110,25 +109,16 @@ fn survey(
     }
 
     let squares = Squares::new(wall, plan.square_m, &found);
-    let medians = |of: &dyn Fn(&RowMotion, usize) -> Option<f64>| {
-        [0, 1, 2].map(|axis| {
-            let mut values: Vec<f64> = found.iter().filter_map(|(_, m)| of(m, axis)).collect();
-            median(&mut values).map(|sd| 1e3 * sd)
-        })
-    };
-    let limits_mm = |of: fn(&Deformation) -> [Option<f64>; 3]| {
-        let limits = registered.deformation.as_ref().map_or([None; 3], of);
-        limits.map(|limit| limit.map(|m| 1e3 * m))
-    };
+    let deformation = registered.deformation.as_ref();
     let summary = PlannedSurvey {
         stations: stations(plan, added).map(|s| s.name.clone()).collect(),
         added: added.map(|s| s.name.clone()),
         stones: [squares.stones(), found.len()],
         datum: measured.datum.state,
-        sd_mm: medians(&|m, axis| Some(m.face_sd[axis])),
-        sd_deformation_mm: medians(&|m, axis| m.deformation_sd[axis]),
-        zones_mm: limits_mm(|d| d.detection_limits_m),
-        zones_in_face_mm: limits_mm(|d| d.limits_in_face_m),
+        sd_mm: medians_mm(&found, |(_, m), axis| Some(m.face_sd[axis])),
+        sd_deformation_mm: medians_mm(&found, |(_, m), axis| m.deformation_sd[axis]),
+        zones_mm: limits_mm(deformation, |d| d.detection_limits_m),
+        zones_in_face_mm: limits_mm(deformation, |d| d.limits_in_face_m),
         squares: [squares.count(), squares.unseen()],
         weakest: squares.weakest(),
     };

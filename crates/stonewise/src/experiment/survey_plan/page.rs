@@ -2,6 +2,7 @@
 
 use super::planned::PlannedSurvey;
 use super::squares::Squares;
+use crate::experiment::predicted::in_table;
 use crate::figure::{Axis, GREY, Item, Page, Plot, Ramp, table};
 use stonewise_core::registration::ZONE_EXTENTS_M;
 
@@ -16,8 +17,7 @@ pub(super) fn page(surveys: &[(PlannedSurvey, Squares)]) -> String {
          square is the one whose stones are measured worst; its figure is the standard deviation of their deformation in \
          space. In squares that are not seen, most stones are not measured.",
     );
-    let number = |mm: Option<f64>| mm.map_or("\u{2013}".to_owned(), |mm| format!("{mm:.2}"));
-    let three = |values: [Option<f64>; 3]| values.map(number).join(" / ");
+    let three = |values: [Option<f64>; 3]| values.map(in_table).join(" / ");
     let name = |survey: &PlannedSurvey| match &survey.added {
         Some(name) => format!("with {name}"),
         None => "as planned".to_owned(),
