@@ -1,6 +1,7 @@
 //! Operations with weights.
 
 use super::kernels::convolution::{self, Geometry};
+use super::kernels::depthwise::{self, Depthwise};
 use super::kernels::product::product;
 use super::kernels::{Filters, group_norm, sparse_product, winograd};
 use super::sparse::SparseMatrix;
@@ -11,7 +12,20 @@ impl Tensor {
     /// Convolution of [batch, in, rows, columns] with [out, in, size, size], odd size, padded by half of it
     /// with zeros, plus a bias for each output.
     pub fn convolved(&self, weight: &Self, bias: Option<&Self>, stride: usize) -> Self {
-        let geometry = geometry(self, weight, stride);
+        self.convolved_as(weight, bias, geometry(self, weight, stride))
+    }
+
+    /// As [`Tensor::convolved`], with the padding that TensorFlow calls `SAME`: an odd row or column of zeros lies below
+    /// or right.
+    pub fn convolved_same(&self, weight: &Self, bias: Option<&Self>, stride: usize) -> Self {
+        let geometry = Geometry {
+            is_same: true,
+            ..geometry(self, weight, stride)
+        };
+        self.convolved_as(weight, bias, geometry)
+    }
+
+    fn convolved_as(&self, weight: &Self, bias: Option<&Self>, geometry: Geometry) -> Self {
         let y = convolution::forward(self.values(), weight.values(), bias.map(Self::values), &geometry);
         let nodes = [self.node(), weight.node(), bias.and_then(Self::node)];
         let (x, weight) = (self.shared(), weight.shared());
@@ -32,6 +46,22 @@ impl Tensor {
         let geometry = geometry(self, weight, 1);
         let y = winograd::forward(self.values(), filters, bias.map(Self::values), &geometry);
         Self::new(geometry.output_shape(), y)
+    }
+
+    /// ReLU6, depthwise convolution with weights [channels, 1, size, size], odd size, and padding `SAME`, plus a bias for
+    /// each channel, ReLU6; not recorded.
+    pub fn depthwise_between_relu6(&self, weight: &Self, bias: &Self, stride: usize) -> Self {
+        let [batch, channels, rows, columns] = self.dims();
+        let shape = Depthwise {
+            channels,
+            rows,
+            columns,
+            size: weight.dims::<3>()[2],
+            stride,
+        };
+        let y = depthwise::forward(self.values(), weight.values(), bias.values(), &shape);
+        let [rows, columns] = shape.output_size();
+        Self::new([batch, channels, rows, columns], y)
     }
 
     /// The product of [items, in] with weights [out, in], plus a bias for each output: [items, out].
@@ -100,6 +130,7 @@ fn geometry(x: &Tensor, weight: &Tensor, stride: usize) -> Geometry {
         outputs,
         size,
         stride,
+        is_same: false,
     }
 }
 

@@ -1,5 +1,6 @@
 //! Convolution as products of matrices, on slices: batch, channel, row, column.
 
+use super::same_padding::same_padding;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use rayon::prelude::*;
@@ -10,7 +11,7 @@ const BLOCK: usize = 1 << 17;
 /// Minimum number of columns of a block, if the result has that many: products with fewer are slow.
 const LEAST_COLUMNS: usize = 96;
 
-/// Sizes of a convolution padded by half its odd size.
+/// Sizes of a convolution with an odd size of kernel.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry {
     pub batch: usize,
@@ -20,6 +21,8 @@ pub struct Geometry {
     pub outputs: usize,
     pub size: usize,
     pub stride: usize,
+    /// Padded as `SAME` says, else by half the size of the kernel on all sides.
+    pub is_same: bool,
 }
 
 impl Geometry {
@@ -61,7 +64,11 @@ impl Geometry {
     /// Output places along an axis of `outputs` at which tap `tap` lies inside an input of `inputs`, and the
     /// input place of the first.
     fn inside(&self, tap: usize, outputs: usize, inputs: usize) -> (Range<usize>, usize) {
-        let padding = self.size / 2;
+        let padding = if self.is_same {
+            same_padding(inputs, self.size, self.stride)
+        } else {
+            self.size / 2
+        };
         let first = padding.saturating_sub(tap).div_ceil(self.stride);
         let end = (inputs + padding)
             .saturating_sub(tap)
@@ -311,7 +318,7 @@ fn gather(x: &[f32], geometry: &Geometry, range: Range<usize>, patches: &mut Vec
 }
 
 /// Fills a row with every `stride`-th value of another.
-fn take_every(stride: usize, source: &[f32], target: &mut [f32]) {
+pub fn take_every(stride: usize, source: &[f32], target: &mut [f32]) {
     match stride {
         1 => target.copy_from_slice(&source[..target.len()]),
         2 => {
@@ -362,7 +369,7 @@ fn scatter(patches: &[f32], geometry: &Geometry, x: &mut [f32]) {
 mod tests {
     use super::*;
 
-    const CASES: [Geometry; 7] = {
+    const CASES: [Geometry; 10] = {
         let base = Geometry {
             batch: 2,
             inputs: 3,
@@ -371,9 +378,18 @@ mod tests {
             outputs: 4,
             size: 3,
             stride: 1,
+            is_same: false,
+        };
+        let same = Geometry {
+            stride: 2,
+            is_same: true,
+            ..base
         };
         [
             base,
+            same,
+            Geometry { size: 5, ..same },
+            Geometry { columns: 300, ..same },
             Geometry { stride: 2, ..base },
             Geometry { size: 1, ..base },
             Geometry {
@@ -409,19 +425,24 @@ mod tests {
     /// Calls `each` with the places of output, input and weight of every product of the definition.
     fn for_each_product(g: &Geometry, mut each: impl FnMut(usize, usize, usize)) {
         let [rows, columns] = g.output_size();
-        let half = g.size / 2;
+        let before = |side: usize| {
+            // lab/detector/lite0.py: zeros that are needed, half of them before.
+            let needed = ((side.div_ceil(g.stride) - 1) * g.stride + g.size).saturating_sub(side);
+            if g.is_same { needed / 2 } else { g.size / 2 }
+        };
+        let [above, left] = [g.rows, g.columns].map(before);
         for image in 0..g.batch {
             for output in 0..g.outputs {
                 for (row, column) in (0..rows * columns).map(|i| (i / columns, i % columns)) {
                     for input in 0..g.inputs {
                         for (tap_row, tap_column) in (0..g.taps()).map(|i| (i / g.size, i % g.size)) {
                             let (y, x) = (row * g.stride + tap_row, column * g.stride + tap_column);
-                            if y < half || x < half || y - half >= g.rows || x - half >= g.columns {
+                            if y < above || x < left || y - above >= g.rows || x - left >= g.columns {
                                 continue;
                             }
                             each(
                                 ((image * g.outputs + output) * rows + row) * columns + column,
-                                ((image * g.inputs + input) * g.rows + y - half) * g.columns + x - half,
+                                ((image * g.inputs + input) * g.rows + y - above) * g.columns + x - left,
                                 ((output * g.inputs + input) * g.size + tap_row) * g.size + tap_column,
                             );
                         }

@@ -400,6 +400,7 @@ mod tests {
             outputs,
             size: 3,
             stride: 1,
+            is_same: false,
         }
     }
 
