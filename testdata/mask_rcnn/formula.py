@@ -1,6 +1,6 @@
 """Weights and an image that follow from a formula, so that no file has to carry them.
 
-The same formula is in crates/stonewise-segment/tests/torchvision.rs.
+The same formula is in crates/stonewise-testing/src/formula.rs.
 """
 
 import numpy as np

@@ -3,8 +3,8 @@
 
 use stonewise_core::raster::{LabelImage, Raster, RgbImage};
 use stonewise_segment::model::{
-    BackboneConfig, MaskRcnn, MaskRcnnConfig, Norm, Precision, ResnetDepth, RoiConfig, SamplingConfig,
-    WeightsError, load_weights, save_weights, weights_from_bytes,
+    BackboneConfig, MaskRcnn, MaskRcnnConfig, Norm, Precision, ResnetConfig, ResnetDepth, RoiConfig,
+    SamplingConfig, WeightsError, load_weights, save_weights, weights_from_bytes,
 };
 use stonewise_segment::train::{AdamW, AdamWParams};
 use stonewise_segment::{Detector, Sample, StoneFinder};
@@ -18,14 +18,18 @@ const STONES: [[u32; 4]; 5] = [
     [60, 42, 90, 84],
 ];
 
+fn resnet(depth: ResnetDepth) -> BackboneConfig {
+    BackboneConfig::Resnet(ResnetConfig {
+        depth,
+        width: 16,
+        norm: Norm::Group { groups: 4 },
+    })
+}
+
 fn small() -> MaskRcnnConfig {
     let light = MaskRcnnConfig::light();
     MaskRcnnConfig {
-        backbone: BackboneConfig {
-            depth: ResnetDepth::R18,
-            width: 16,
-            norm: Norm::Group { groups: 4 },
-        },
+        backbone: resnet(ResnetDepth::R18),
         fpn_channels: 16,
         head_groups: Some(4),
         roi: RoiConfig {
@@ -156,10 +160,7 @@ fn weights_of_another_network_are_refused_by_name() {
         "{wider}"
     );
     let deeper = MaskRcnnConfig {
-        backbone: BackboneConfig {
-            depth: ResnetDepth::R34,
-            ..small().backbone
-        },
+        backbone: resnet(ResnetDepth::R34),
         ..small()
     };
     let deeper = refusal(deeper);

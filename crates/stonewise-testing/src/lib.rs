@@ -2,6 +2,7 @@
 
 mod bundle;
 mod csv_metadata;
+pub mod formula;
 mod module_graph;
 mod normal;
 mod surveys;

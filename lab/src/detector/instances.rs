@@ -6,14 +6,16 @@ use crate::words::Words;
 use std::path::Path;
 use std::time::Instant;
 use stonewise_core::raster::Raster;
-use stonewise_segment::model::{MaskRcnn, MaskRcnnConfig, Norm, load_weights};
+use stonewise_segment::model::{BackboneConfig, MaskRcnn, MaskRcnnConfig, Norm, load_weights};
 
 pub fn run(words: &Words) -> Outcome {
     let [weights, out, images @ ..] = words.as_slice() else {
         return Err("usage: instances WEIGHTS.safetensors OUT.json IMAGE...".into());
     };
     let mut config = MaskRcnnConfig::torchvision_r50();
-    config.backbone.norm = Norm::FrozenBatch { epsilon: 1e-5 };
+    if let BackboneConfig::Resnet(resnet) = &mut config.backbone {
+        resnet.norm = Norm::FrozenBatch { epsilon: 1e-5 };
+    }
     let model = load_weights(MaskRcnn::zeros(&config)?, Path::new(weights))?.for_inference();
     let mut photos = Vec::new();
 

@@ -31,9 +31,25 @@ pub enum Norm {
     },
 }
 
-/// The residual network.
+/// The network that turns images into features.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BackboneConfig {
+#[serde(
+    untagged,
+    expecting = "backbone must be a residual network (depth R18, R34 or R50, width, norm) or an efficientnet_lite"
+)]
+pub enum BackboneConfig {
+    /// A residual network.
+    Resnet(ResnetConfig),
+    /// EfficientNet-Lite (Tan & Le 2019, without squeeze-and-excitation). Training leaves its weights alone.
+    EfficientNetLite {
+        /// Which one: 0, 1 or 2.
+        efficientnet_lite: usize,
+    },
+}
+
+/// A residual network.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResnetConfig {
     /// Number of layers.
     pub depth: ResnetDepth,
     /// Channels of the first stage; 64 as published.
@@ -113,13 +129,14 @@ pub struct MaskRcnnConfig {
     /// Each channel is divided by this.
     pub pixel_std: [f32; 3],
     /// Channels of [relief](stonewise_core::raster::ReliefMap) that the model takes beside colour, 0 where it
-    /// has not learnt relief. They have a convolution of their own, whose output is added to that of the
-    /// colours: a wider first layer, of which colour alone uses its part.
+    /// has not learnt relief. In a residual network they have a convolution of their own, whose output is added to
+    /// that of the colours: a wider first layer, of which colour alone uses its part. Beside EfficientNet-Lite they have
+    /// a stem, which takes relief of half the rows and columns and is joined at the feature pyramid.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub relief_channels: usize,
     /// Size at which images are looked at; `None` as they are.
     pub resize: Option<Resize>,
-    /// Residual network.
+    /// Network that gives the features.
     pub backbone: BackboneConfig,
     /// Channels of the feature pyramid.
     pub fpn_channels: usize,
@@ -127,6 +144,9 @@ pub struct MaskRcnnConfig {
     /// scratch needs (He et al. 2019); `None`: not normalised, as published.
     #[serde(default)]
     pub head_groups: Option<usize>,
+    /// The convolution of the proposal network has a bias instead of a normalisation even with `head_groups`.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub plain_proposals: bool,
     /// Reference boxes.
     pub anchors: AnchorConfig,
     /// Reference boxes in training.
@@ -162,13 +182,14 @@ impl MaskRcnnConfig {
                 shorter: 800,
                 longest: 1333,
             }),
-            backbone: BackboneConfig {
+            backbone: BackboneConfig::Resnet(ResnetConfig {
                 depth: ResnetDepth::R50,
                 width: 64,
                 norm: Norm::FrozenBatch { epsilon: 0.0 },
-            },
+            }),
             fpn_channels: 256,
             head_groups: None,
+            plain_proposals: false,
             anchors: AnchorConfig {
                 sizes: [32.0, 64.0, 128.0, 256.0, 512.0].map(|size| vec![size]),
                 aspect_ratios: vec![0.5, 1.0, 2.0],
@@ -211,11 +232,11 @@ impl MaskRcnnConfig {
         Self {
             classes: 2,
             resize: None,
-            backbone: BackboneConfig {
+            backbone: BackboneConfig::Resnet(ResnetConfig {
                 depth: ResnetDepth::R18,
                 width: 64,
                 norm: Norm::Group { groups: 16 },
-            },
+            }),
             fpn_channels: 64,
             head_groups: Some(16),
             anchors: AnchorConfig {
@@ -243,6 +264,22 @@ impl MaskRcnnConfig {
         }
     }
 
+    /// The model of `lab/detector` on EfficientNet-Lite`size`, which only a file of weights makes useful: its backbone
+    /// is never trained here.
+    pub fn efficientnet_lite(size: usize) -> Self {
+        Self {
+            // Values 0 to 255 enter as (value - 127) / 128.
+            pixel_mean: [127.0 / 255.0; 3],
+            pixel_std: [128.0 / 255.0; 3],
+            backbone: BackboneConfig::EfficientNetLite {
+                efficientnet_lite: size,
+            },
+            fpn_channels: 96,
+            plain_proposals: true,
+            ..Self::light()
+        }
+    }
+
     /// Adds all channels of relief to the model's input.
     #[must_use]
     pub fn with_relief(self) -> Self {
@@ -261,7 +298,17 @@ impl MaskRcnnConfig {
         if self.classes < 2 {
             return fail("classes must be 2 or more (background is one)");
         }
-        if self.backbone.width == 0 || self.fpn_channels == 0 || self.roi.box_hidden == 0 {
+        let resnet = match &self.backbone {
+            BackboneConfig::Resnet(resnet) => Some(resnet),
+            BackboneConfig::EfficientNetLite { efficientnet_lite } if *efficientnet_lite < 3 => None,
+            BackboneConfig::EfficientNetLite { .. } => {
+                return fail("backbone.efficientnet_lite must be 0, 1 or 2");
+            }
+        };
+        if resnet.is_some_and(|resnet| resnet.width == 0)
+            || self.fpn_channels == 0
+            || self.roi.box_hidden == 0
+        {
             return fail("backbone.width, fpn_channels and roi.box_hidden must be 1 or more");
         }
         if self.roi.mask_channels.is_empty() || self.roi.mask_channels.contains(&0) {
@@ -271,10 +318,25 @@ impl MaskRcnnConfig {
             return fail("roi.box_cells, roi.mask_cells and roi.samples must be 1 or more");
         }
 
-        if let Norm::Group { groups } = self.backbone.norm {
-            let mut normalised = self.roi.mask_channels.clone();
-            normalised.extend([self.backbone.width, self.fpn_channels]);
-            if groups == 0 || normalised.iter().any(|channels| !channels.is_multiple_of(groups)) {
+        let mut normalised = self.roi.mask_channels.clone();
+        normalised.push(self.fpn_channels);
+        let is_divided = |channels: &[usize], groups: usize| {
+            groups > 0 && channels.iter().all(|channels| channels.is_multiple_of(groups))
+        };
+        if self
+            .head_groups
+            .is_some_and(|groups| !is_divided(&normalised, groups))
+        {
+            return fail("head_groups must divide fpn_channels and roi.mask_channels");
+        }
+        if let Some(ResnetConfig {
+            width,
+            norm: Norm::Group { groups },
+            ..
+        }) = resnet
+        {
+            normalised.push(*width);
+            if !is_divided(&normalised, *groups) {
                 return fail(
                     "norm.group.groups must divide backbone.width, fpn_channels and roi.mask_channels",
                 );
@@ -291,7 +353,7 @@ impl MaskRcnnConfig {
         if self.pixel_std.iter().any(|std| !std.is_finite() || *std <= 0.0) {
             return fail("pixel_std must be finite and above 0");
         }
-        let is_frozen = matches!(self.backbone.norm, Norm::FrozenBatch { .. });
+        let is_frozen = resnet.is_some_and(|resnet| matches!(resnet.norm, Norm::FrozenBatch { .. }));
 
         if self.relief_channels != 0 && (self.relief_channels != RELIEF_CHANNELS || is_frozen) {
             return Err(ConfigError(format!(
@@ -318,4 +380,9 @@ impl MaskRcnnConfig {
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
 fn is_zero(channels: &usize) -> bool {
     *channels == 0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
+fn is_false(flag: &bool) -> bool {
+    !flag
 }

@@ -1,5 +1,6 @@
 //! Feature pyramid (Lin et al. 2017, section 3).
 
+use super::backbone::Features;
 use super::config::Norm;
 use super::init::Init;
 use super::layers::{ConvBlock, Spread};
@@ -29,13 +30,19 @@ impl Fpn {
         blocks.for_each(ConvBlock::prepare);
     }
 
-    /// Levels of strides 4, 8, 16, 32 and 64, finest first. The image's sides must be multiples of 32.
-    pub fn forward(&self, features: [Tensor; 4]) -> Vec<Tensor> {
+    /// Levels of strides 4, 8, 16, 32 and 64, finest first. The image's sides must be multiples of 32. What relief adds
+    /// comes to the levels before they are joined.
+    pub fn forward(&self, features: Features) -> Vec<Tensor> {
+        let mut relief = features.relief.into_iter().rev();
         let mut levels = Vec::with_capacity(5);
         let mut above: Option<Tensor> = None;
         let blocks = self.inner_blocks.iter().zip(&self.layer_blocks);
-        for (feature, (inner, layer)) in features.into_iter().zip(blocks).rev() {
+        for (feature, (inner, layer)) in features.images.into_iter().zip(blocks).rev() {
             let lateral = inner.forward(feature);
+            let lateral = match relief.next() {
+                Some(relief) => lateral.plus(&relief),
+                None => lateral,
+            };
             let merged = match above {
                 Some(above) => lateral.plus_doubled(&above),
                 None => lateral,

@@ -2,6 +2,7 @@
 
 use super::activation::{sigmoid, softmax};
 use super::anchors::anchors;
+use super::backbone::{Backbone, channels};
 use super::boxes::{Bounds, HEAD_WEIGHTS, clip, decode, is_large};
 use super::config::{ConfigError, MaskRcnnConfig};
 use super::contrast::has_contrast;
@@ -12,7 +13,6 @@ use super::nms::suppress;
 use super::parameter::Parameters;
 use super::paste::paste_mask;
 use super::preprocess::{Seen, batch, relief_batch};
-use super::resnet::{Resnet, channels};
 use super::roi_align::{FeatureRows, RoiAlign};
 use super::rpn::{AnchorScores, Rpn, proposals};
 use crate::Detection;
@@ -25,7 +25,7 @@ const MIN_SIDE: f32 = 1e-2;
 /// Mask R-CNN. Its parameters have torchvision's names.
 #[derive(Clone, Debug)]
 pub struct MaskRcnn {
-    body: Resnet,
+    backbone: Backbone,
     fpn: Fpn,
     rpn: Rpn,
     pub(super) roi_heads: RoiHeads,
@@ -75,9 +75,14 @@ impl MaskRcnn {
         let shapes = config.anchors.sizes[0].len() * config.anchors.aspect_ratios.len();
         let norm = config.head_norm();
         Ok(Self {
-            body: Resnet::new(init, &config.backbone, config.relief_channels),
+            backbone: Backbone::new(init, config, seed),
             fpn: Fpn::new(init, channels(&config.backbone), config.fpn_channels, norm),
-            rpn: Rpn::new(init, config.fpn_channels, shapes, norm),
+            rpn: Rpn::new(
+                init,
+                config.fpn_channels,
+                shapes,
+                norm.filter(|_| !config.plain_proposals),
+            ),
             roi_heads: RoiHeads::new(init, config),
             config: config.clone(),
         })
@@ -90,13 +95,13 @@ impl MaskRcnn {
 
     /// Whether relief makes a difference.
     pub fn takes_relief(&self) -> bool {
-        self.body.takes_relief()
+        self.backbone.takes_relief()
     }
 
     /// All parameters, to be changed.
     pub(crate) fn parameters(&mut self) -> Parameters<'_> {
         let mut found = Vec::new();
-        self.body.parameters("backbone.body", &mut found);
+        self.backbone.parameters("backbone", &mut found);
         self.fpn.parameters("backbone.fpn", &mut found);
         self.rpn.parameters("rpn", &mut found);
         self.roi_heads.parameters("roi_heads", &mut found);
@@ -107,7 +112,7 @@ impl MaskRcnn {
     /// the form that is fastest in use. The model can then neither be trained nor saved under torchvision's names.
     #[must_use]
     pub fn for_inference(mut self) -> Self {
-        self.body.prepare();
+        self.backbone.prepare();
         self.fpn.prepare();
         self.rpn.prepare();
         self.roi_heads.prepare();
@@ -219,12 +224,7 @@ impl MaskRcnn {
     /// Looks at images [batch, 3, rows, columns] and their relief.
     pub(super) fn look(&self, images: &Tensor, relief: &[Option<&ReliefMap>], seen: &[Seen]) -> Sight {
         let [_, _, rows, columns] = images.dims();
-        let relief = if self.takes_relief() {
-            relief_batch(relief, seen, [columns, rows])
-        } else {
-            None
-        };
-        let levels = self.fpn.forward(self.body.forward(images, relief.as_ref()));
+        let levels = self.levels(images, relief, seen);
         let grid = |level: &Tensor| {
             let [_, _, rows, columns] = level.dims();
             [columns, rows]
@@ -235,6 +235,24 @@ impl MaskRcnn {
             scores: self.rpn.forward(&levels),
             anchors: anchors(&self.config.anchors, [columns, rows], &grids),
         }
+    }
+
+    /// Levels of the feature pyramid of images [batch, 3, rows, columns] and their relief.
+    pub(super) fn levels(
+        &self,
+        images: &Tensor,
+        relief: &[Option<&ReliefMap>],
+        seen: &[Seen],
+    ) -> Vec<Tensor> {
+        let [_, _, rows, columns] = images.dims();
+        let present: Vec<bool> = relief.iter().map(Option::is_some).collect();
+        let relief = if self.takes_relief() {
+            relief_batch(relief, seen, [columns, rows], self.backbone.relief_step())
+        } else {
+            None
+        };
+        self.fpn
+            .forward(self.backbone.forward(images, relief.as_ref(), &present))
     }
 
     /// The objects in regions of one image, best first, without masks; bounds in pixels of the model.

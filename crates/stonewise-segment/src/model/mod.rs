@@ -6,9 +6,11 @@
 
 mod activation;
 mod anchors;
+mod backbone;
 mod boxes;
 mod config;
 mod contrast;
+mod efficientnet_lite;
 mod fpn;
 mod gradients;
 mod heads;
@@ -23,16 +25,19 @@ mod nms;
 mod parameter;
 mod paste;
 mod preprocess;
+mod relief_stem;
 mod resnet;
 mod roi_align;
 mod rpn;
 mod sampler;
 mod targets;
+#[cfg(test)]
+mod tests;
 mod weights;
 
 pub use config::{
-    AnchorConfig, BackboneConfig, ConfigError, MaskRcnnConfig, Norm, ProposalConfig, Resize, ResnetDepth,
-    RoiConfig, SamplingConfig,
+    AnchorConfig, BackboneConfig, ConfigError, MaskRcnnConfig, Norm, ProposalConfig, Resize, ResnetConfig,
+    ResnetDepth, RoiConfig, SamplingConfig,
 };
 pub use gradients::Gradients;
 pub use losses::Losses;

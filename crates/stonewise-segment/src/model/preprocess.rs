@@ -64,14 +64,17 @@ pub fn batch(images: &[&RgbImage], seen: &[Seen], config: &MaskRcnnConfig) -> Te
     Tensor::new([images.len(), 3, height, width], values)
 }
 
-/// Relief [batch, channels, rows, columns] of a batch of images, with `width` columns and `height` rows; zeros where an
-/// image has none; `None` where no image has any.
+/// Relief [batch, channels, rows, columns] of a batch of images, padded to `width` columns and `height` rows of the
+/// images, with one column and row for every `step` of them; zeros where an image has none; `None` where no image has
+/// any.
 pub fn relief_batch(
     reliefs: &[Option<&ReliefMap>],
     seen: &[Seen],
-    [width, height]: [usize; 2],
+    size: [usize; 2],
+    step: usize,
 ) -> Option<Tensor> {
     reliefs.iter().flatten().next()?;
+    let [width, height] = size.map(|side| side / step);
     let mut values = vec![0.0f32; reliefs.len() * RELIEF_CHANNELS * height * width];
     for ((values, relief), seen) in values
         .chunks_mut(RELIEF_CHANNELS * height * width)
@@ -79,9 +82,17 @@ pub fn relief_batch(
         .zip(seen)
     {
         let Some(relief) = relief else { continue };
-        let relief = resampled(relief, [0.0, 0.0, 1.0, 1.0], seen.size.map(|side| side as u32));
+        let [columns, rows] = seen.size.map(|side| side.div_ceil(step));
+        // The last column and row may reach beyond the image.
+        let reach = [columns, rows].map(|side| (step * side) as f64);
+        let part = [0, 1].map(|axis| reach[axis] / seen.size[axis] as f64);
+        let relief = resampled(
+            relief,
+            [0.0, 0.0, part[0], part[1]],
+            [columns as u32, rows as u32],
+        );
         for (channel, plane) in values.chunks_mut(height * width).enumerate() {
-            for (to, from) in plane.chunks_mut(width).zip(relief.data().chunks(seen.size[0])) {
+            for (to, from) in plane.chunks_mut(width).zip(relief.data().chunks(columns)) {
                 to.iter_mut().zip(from).for_each(|(to, from)| *to = from[channel]);
             }
         }

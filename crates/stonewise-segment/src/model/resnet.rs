@@ -1,7 +1,7 @@
 //! Residual networks (He et al. 2016) of 18, 34 and 50 layers; strides sit at the 3 x 3 convolutions, as in
 //! torchvision.
 
-use super::config::{BackboneConfig, ResnetDepth};
+use super::config::{ResnetConfig, ResnetDepth};
 use super::init::Init;
 use super::layers::{Conv, ConvBlock, Norm, Spread};
 use super::parameter::{Parameters, part};
@@ -15,7 +15,7 @@ struct Block {
 }
 
 impl Block {
-    fn new(init: &mut Init, config: &BackboneConfig, inputs: usize, width: usize, stride: usize) -> Self {
+    fn new(init: &mut Init, config: &ResnetConfig, inputs: usize, width: usize, stride: usize) -> Self {
         let outputs = width * expansion(config.depth);
         let mut layer = |channels: [usize; 2], size, stride, scale| ConvBlock {
             conv: Conv::new(init, channels, size, stride, Spread::KaimingNormal, false),
@@ -79,7 +79,7 @@ pub struct Resnet {
 
 impl Resnet {
     /// `relief`: channels beside colour; their weights begin as zeros.
-    pub fn new(init: &mut Init, config: &BackboneConfig, relief: usize) -> Self {
+    pub fn new(init: &mut Init, config: &ResnetConfig, relief: usize) -> Self {
         let blocks = match config.depth {
             ResnetDepth::R18 => [2, 2, 2, 2],
             ResnetDepth::R34 | ResnetDepth::R50 => [3, 4, 6, 3],
@@ -153,7 +153,7 @@ impl Resnet {
 }
 
 /// Channels of the four stages' features.
-pub fn channels(config: &BackboneConfig) -> [usize; 4] {
+pub fn channels(config: &ResnetConfig) -> [usize; 4] {
     [0, 1, 2, 3].map(|stage| (config.width << stage) * expansion(config.depth))
 }
 

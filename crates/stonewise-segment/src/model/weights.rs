@@ -10,8 +10,13 @@ use std::path::{Path, PathBuf};
 /// Key of the model's configuration in a file's metadata.
 pub(super) const CONFIG_KEY: &str = "stonewise_model";
 
-/// Name of the weights of relief, which files of colour alone do not have.
-const RELIEF_KEY: &str = "backbone.body.relief.weight";
+/// Beginnings of the names of weights of relief, which files of colour alone do not have: of a residual network, of the
+/// stem of relief, and of what takes the stem's results to the pyramid.
+const RELIEF: [&str; 3] = [
+    "backbone.body.relief.",
+    "backbone.relief.",
+    "backbone.relief.laterals.",
+];
 
 /// How weights are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,7 +102,7 @@ pub enum WeightsError {
 }
 
 /// Replaces all parameters of a model by those of a file. A file of colour alone fits a model with relief,
-/// too: the weights of relief become zeros, and the model does what it did without.
+/// too: the first or last weights of relief become zeros, and the model does what it did without.
 ///
 /// # Errors
 /// The file cannot be read, lacks a parameter, has one too many or one of another shape.
@@ -137,12 +142,17 @@ pub fn weights_from_bytes(mut model: MaskRcnn, bytes: &[u8], name: &str) -> Resu
             tensors.insert(current_name(&key), view);
         }
     }
+    let of_relief = |key: &str, names: &[&str]| names.iter().any(|name| key.starts_with(name));
+    let is_colour_alone = !tensors.keys().any(|key| of_relief(key, &RELIEF));
     for (key, param) in model.parameters() {
         let shape = param.tensor.shape().to_vec();
         let values = match tensors.remove(&key) {
             Some(view) => values_of(&view, name, key, &shape)?,
             // Weights that have not learnt relief: it makes no difference.
-            None if key == RELIEF_KEY => vec![0.0; shape.iter().product()],
+            None if is_colour_alone && of_relief(&key, &[RELIEF[0], RELIEF[2]]) => {
+                vec![0.0; shape.iter().product()]
+            }
+            None if is_colour_alone && of_relief(&key, &RELIEF) => continue,
             None => {
                 return Err(WeightsError::Missing {
                     name: name.to_owned(),

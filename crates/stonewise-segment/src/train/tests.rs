@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::Sample;
-use crate::model::{BackboneConfig, MaskRcnnConfig, Norm, RoiConfig};
+use crate::model::{BackboneConfig, MaskRcnnConfig, Norm, ResnetConfig, ResnetDepth, RoiConfig};
 use std::path::Path;
 use stonewise_core::progress::Silent;
 use stonewise_core::raster::Raster;
@@ -10,11 +10,11 @@ use stonewise_core::raster::Raster;
 fn config() -> MaskRcnnConfig {
     let light = MaskRcnnConfig::light();
     MaskRcnnConfig {
-        backbone: BackboneConfig {
+        backbone: BackboneConfig::Resnet(ResnetConfig {
+            depth: ResnetDepth::R18,
             width: 8,
             norm: Norm::Group { groups: 4 },
-            ..light.backbone
-        },
+        }),
         fpn_channels: 8,
         head_groups: Some(4),
         roi: RoiConfig {
