@@ -15,8 +15,8 @@ impl Tensor {
         self.convolved_as(weight, bias, geometry(self, weight, stride))
     }
 
-    /// As [`Tensor::convolved`], with the padding that TensorFlow calls `SAME`: an odd row or column of zeros lies below
-    /// or right.
+    /// As [`Tensor::convolved`], with the padding that TensorFlow calls `SAME`: an odd row or column of zeros lies
+    /// below or right.
     pub fn convolved_same(&self, weight: &Self, bias: Option<&Self>, stride: usize) -> Self {
         let geometry = Geometry {
             is_same: true,
@@ -48,8 +48,8 @@ impl Tensor {
         Self::new(geometry.output_shape(), y)
     }
 
-    /// ReLU6, depthwise convolution with weights [channels, 1, size, size], odd size, and padding `SAME`, plus a bias for
-    /// each channel, ReLU6; not recorded.
+    /// ReLU6, depthwise convolution with weights [channels, 1, size, size], odd size, and padding `SAME`, plus a bias
+    /// for each channel, ReLU6; not recorded.
     pub fn depthwise_between_relu6(&self, weight: &Self, bias: &Self, stride: usize) -> Self {
         let [batch, channels, rows, columns] = self.dims();
         let shape = Depthwise {

@@ -10,6 +10,7 @@ use crate::engine::Tensor;
 
 /// One of the networks that a configuration can name.
 #[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant, reason = "a model has one backbone")]
 pub enum Backbone {
     /// Relief is added at its first layer.
     Resnet(Resnet),

@@ -130,8 +130,8 @@ pub struct MaskRcnnConfig {
     pub pixel_std: [f32; 3],
     /// Channels of [relief](stonewise_core::raster::ReliefMap) that the model takes beside colour, 0 where it
     /// has not learnt relief. In a residual network they have a convolution of their own, whose output is added to
-    /// that of the colours: a wider first layer, of which colour alone uses its part. Beside EfficientNet-Lite they have
-    /// a stem, which takes relief of half the rows and columns and is joined at the feature pyramid.
+    /// that of the colours: a wider first layer, of which colour alone uses its part. Beside EfficientNet-Lite they
+    /// have a stem, which takes relief of half the rows and columns and is joined at the feature pyramid.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub relief_channels: usize,
     /// Size at which images are looked at; `None` as they are.

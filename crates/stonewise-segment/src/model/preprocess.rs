@@ -181,4 +181,23 @@ mod tests {
         assert!((at(2, 51, 69) - 7.0).abs() < 1e-3);
         assert_eq!([at(2, 52, 0), at(2, 0, 70)], [0.0, 0.0]);
     }
+
+    #[test]
+    fn relief_of_half_the_rows_and_columns_keeps_its_place() {
+        // Of the same size as a photo of odd sides; values are places of the photo, pixels.
+        let pixel = |i: u32| [(i % 51) as f32 + 0.5, (i / 51) as f32 + 0.5, 0.0, 1.0];
+        let relief = Raster::from_vec(51, 31, (0..51 * 31).map(pixel).collect()).unwrap();
+        let seen = [Seen::new(&ramp(51, 31), None)];
+        let tensor = relief_batch(&[Some(&relief)], &seen, [64, 32], 2).unwrap();
+        assert_eq!(tensor.shape(), [1, RELIEF_CHANNELS, 16, 32]);
+        for (place, value) in tensor.values()[..32 * 16].iter().enumerate() {
+            let column = place % 32;
+            let expected = if column < 26 {
+                (2.0 * column as f32 + 1.0).min(50.5)
+            } else {
+                0.0
+            };
+            assert!((value - expected).abs() < 1e-4, "{place}: {value}");
+        }
+    }
 }

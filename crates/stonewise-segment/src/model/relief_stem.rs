@@ -34,8 +34,8 @@ impl ReliefStem {
         Self { stages, laterals }
     }
 
-    /// What relief [batch, channels, rows, columns] of half an image's rows and columns adds to the levels of strides 4,
-    /// 8, 16 and 32 of the image, finest first; nothing to images of which none is `present`.
+    /// What relief [batch, channels, rows, columns] of half an image's rows and columns adds to the levels of strides
+    /// 4, 8, 16 and 32 of the image, finest first; nothing to images of which none is `present`.
     pub fn forward(&self, relief: &Tensor, present: &[bool]) -> Vec<Tensor> {
         let mut x = relief.clone();
         let mut levels = Vec::with_capacity(WIDTHS.len());
