@@ -1,5 +1,5 @@
-"""Training crops: rendered walls from files, changed towards real photos, with real photos that show no stone
-as background and as things in front."""
+"""Training crops: rendered walls from files, changed towards real photos, with doors, windows and the like in
+front of them, and with real photos that show no stone as background and as things in front."""
 
 import io
 from pathlib import Path
@@ -7,6 +7,9 @@ from pathlib import Path
 import numpy as np
 import torch
 from PIL import Image, ImageDraw, ImageFilter
+from scipy.ndimage import find_objects
+
+from things import thing
 
 # A smaller stone, or a part of one, teaches nothing.
 LEAST_PIXELS = 40
@@ -32,7 +35,7 @@ def relief_values(relief):
 
 
 def targets(stones, unknown):
-    """Boxes, numbers and images of the stones that count, for `Detector.losses`."""
+    """Boxes, numbers and images of the stones that count."""
     count = int(stones.max()) + 1
     pixels = np.bincount(stones.ravel(), minlength=count)
     small = (pixels < LEAST_PIXELS) & (pixels > 0)
@@ -40,19 +43,11 @@ def targets(stones, unknown):
     unknown = unknown | small[stones]
     stones = np.where(small[stones], 0, stones)
     numbers = [n for n in range(1, count) if pixels[n] >= LEAST_PIXELS]
-    low = np.full((count, 2), 1 << 20)
-    high = np.zeros((count, 2), np.int64)
-    rows, columns = np.nonzero(stones)
-    at = stones[rows, columns]
-    for axis, places in enumerate((columns, rows)):
-        np.minimum.at(low[:, axis], at, places)
-        np.maximum.at(high[:, axis], at, places + 1)
-    boxes = np.concatenate([low[numbers], high[numbers]], 1).reshape(-1, 4)
+    found = find_objects(stones.astype(np.int32))
+    boxes = [[found[n - 1][1].start, found[n - 1][0].start, found[n - 1][1].stop, found[n - 1][0].stop] for n in numbers]
     return {
-        "boxes": torch.from_numpy(boxes.astype(np.float32)),
-        "labels": torch.ones(len(numbers), dtype=torch.int64),
+        "boxes": torch.tensor(boxes, dtype=torch.float32).reshape(-1, 4),
         "numbers": torch.tensor(numbers, dtype=torch.int64),
-        "masks": torch.empty(0),
         "stones": torch.from_numpy(stones),
         "unknown": torch.from_numpy(unknown),
     }
@@ -92,6 +87,23 @@ class Negatives:
         return np.asarray(mask) > 0
 
 
+def shaded(relief, rng, side):
+    """What a scan without colours shows: relief [4, rows, columns] in a light from above, left or right."""
+    def metres(values, half):
+        return half * values / (1.02 - np.abs(values))
+
+    height = metres(relief[1], 0.04) + rng.uniform(0, 1) * metres(relief[0], 0.01)
+    height = np.asarray(Image.fromarray(height).resize((side, side), Image.BICUBIC))
+    is_known = np.asarray(Image.fromarray(relief[3]).resize((side, side), Image.NEAREST)) > 0
+    down, right = np.gradient(height)
+    slope = -down - rng.choice([-1, 1]) * rng.uniform(0.5, 1.5) * right
+    usual = np.percentile(np.abs(slope[is_known]), 80) if is_known.any() else 0
+    slope = slope / max(usual, 1e-4)
+    value = rng.uniform(0.4, 0.7) + rng.uniform(0.1, 0.3) * slope / np.sqrt(1 + 0.25 * slope * slope)
+    value = np.where(is_known, value, rng.choice([0.0, 0.5, 1.0]))
+    return np.repeat((255 * value.clip(0, 1)).astype(np.uint8)[..., None], 3, 2)
+
+
 def towards_real(photo, rng):
     """Changes of light, lens, camera and file beyond those that the renderer draws, each in some photos."""
     def some(share):
@@ -106,9 +118,9 @@ def towards_real(photo, rng):
         haze = rng.uniform(0.5, 0.95, 3).astype(np.float32)
         share = rng.uniform(0.05, 0.5)
         value = value * (1 - share) + haze * share
-    if some(0.15):
+    if some(0.2):
         grey = value.mean(2, keepdims=True)
-        value = grey + (value - grey) * rng.uniform(0.0, 1.5)
+        value = grey + (value - grey) * max(0.0, rng.uniform(-0.7, 1.5))
     if some(0.15):
         value = value + rng.normal(0, rng.uniform(0.005, 0.04), value.shape).astype(np.float32)
     photo = Image.fromarray((value.clip(0, 1) * 255).round().astype(np.uint8))
@@ -123,16 +135,27 @@ def towards_real(photo, rng):
     return photo
 
 
-class Crops(torch.utils.data.IterableDataset):
-    """Crops without end: a random part of a random file, at a random size, mirrored in half of the cases."""
+# Relief of a smooth face as far away as its surroundings.
+FLAT = np.array([0, 0, 0, 1], np.float32)[:, None, None]
 
-    def __init__(self, folder, negatives, seed, side=320, part=(0.6, 1.0), covered=0.15, empty=0.03):
+
+class Crops:
+    """Crops without end: a random part of a random file, at a random size, mirrored in half of the cases.
+
+    Shares of the crops: `furnished` with painted things in front of the wall, `covered` with parts of negatives,
+    `empty` without any wall; `grey` is the share of those with relief that show the relief and nothing else.
+    """
+
+    def __init__(
+        self, folder, negatives, seed,
+        side=384, part=(0.6, 1.0), furnished=0.25, covered=0.15, empty=0.03, grey=0.12,
+    ):
         self.folder, self.negatives, self.seed = Path(folder), negatives, seed
-        self.side, self.part, self.covered, self.empty = side, part, covered, empty
+        self.side, self.part = side, part
+        self.furnished, self.covered, self.empty, self.grey = furnished, covered, empty, grey
 
     def __iter__(self):
-        worker = torch.utils.data.get_worker_info()
-        rng = np.random.default_rng([self.seed, worker.id if worker else 0])
+        rng = np.random.default_rng(self.seed)
         negatives = Negatives(self.negatives)
         while True:
             # The renderer may still be writing; the labels of a crop come last.
@@ -160,7 +183,23 @@ class Crops(torch.utils.data.IterableDataset):
 
         photo = np.array(photo)
         before = np.bincount(stones.ravel())
-        if negatives.photos and rng.random() < self.covered + self.empty:
+        is_grey = relief is not None and rng.random() < self.grey
+        if is_grey:
+            photo = shaded(relief, rng, side)
+        if not is_grey and rng.random() < self.furnished:
+            for _ in range(rng.integers(1, 4)):
+                colours, shape = thing(rng, side)
+                height, width = shape.shape
+                top, left = rng.integers(-height // 3, side - height // 2), rng.integers(-width // 3, side - width // 2)
+                inner = [slice(max(0, -at), min(n, side - at)) for at, n in ((top, height), (left, width))]
+                outer = [slice(max(0, at), min(side, at + n)) for at, n in ((top, height), (left, width))]
+                mask = np.zeros_like(unknown)
+                mask[outer[0], outer[1]] = shape[inner[0], inner[1]]
+                photo[mask] = colours[inner[0], inner[1]][shape[inner[0], inner[1]]]
+                stones[mask], unknown[mask] = 0, False
+                if relief is not None:
+                    relief = np.where(mask[::2, ::2], FLAT * (rng.random() < 0.7), relief)
+        if not is_grey and negatives.photos and rng.random() < self.covered + self.empty:
             is_empty = rng.random() < self.empty / (self.covered + self.empty)
             for _ in range(1 if is_empty else rng.integers(1, 4)):
                 mask = np.ones_like(unknown) if is_empty else negatives.outline(rng, side)

@@ -1,9 +1,9 @@
 """Writes a trained detector as a safetensors file for `stonewise segment --model`, in half precision.
 
-python3 export.py MODEL.pt OUT.safetensors --backbone FILE.pth [--lite N]
+python3 export.py MODEL.pt OUT.safetensors --backbone FILE.pth [--provenance FILE.json]
 
-MODEL.pt: {"weights": {name: tensor}} as train_detector.py writes it; where it holds no weights of the backbone, those
-of the package's file are taken, batch normalisation folded in.
+MODEL.pt is what train_detector.py writes; weights of the backbone that it does not hold are those of the package's
+file, batch normalisation folded in.
 """
 
 import argparse
@@ -90,13 +90,16 @@ def main():
     parser.add_argument("model")
     parser.add_argument("out")
     parser.add_argument("--backbone", required=True)
-    parser.add_argument("--lite", type=int, choices=(0, 1, 2), default=0)
+    parser.add_argument("--provenance", help="what the weights were trained on and how, kept in the file")
     args = parser.parse_args()
-    weights = torch.load(args.model, map_location="cpu")["weights"]
-    if not any(name.startswith(BODY) for name in weights):
-        weights = {**weights, **body(torch.load(args.backbone, map_location="cpu"))}
+    model = torch.load(args.model, map_location="cpu")
+    package = {name: value.float() for name, value in torch.load(args.backbone, map_location="cpu").items()}
+    weights = {**body(package), **model["weights"]}
     relief = any(name.startswith("backbone.relief.") for name in weights)
-    metadata = {CONFIG_KEY: json.dumps(config(args.lite, relief), separators=(",", ":"))}
+    metadata = {CONFIG_KEY: json.dumps(config(model.get("size", 0), relief), separators=(",", ":"))}
+    if args.provenance:
+        with open(args.provenance) as file:
+            metadata["stonewise_provenance"] = json.dumps(json.load(file))
     with open(args.out, "wb") as file:
         file.write(safetensors(weights, metadata))
 

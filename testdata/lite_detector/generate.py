@@ -19,7 +19,7 @@ from model import Detector
 
 WIDTH, HEIGHT = 128, 96
 VALUES = 12
-# The last two are taken from other levels than the first.
+# RoIAlign takes the last two from other levels than the first three.
 BOXES = [[3, 4, 40, 30], [20.5, 10.2, 90.1, 60.7], [70, 33, 127, 95], [-20, -10, 140, 106], [-100, -60, 230, 180]]
 
 
@@ -35,10 +35,10 @@ def outputs():
         levels = model.features(torch.stack([pixels] * 2), torch.stack([relief] * 2), present)
         logits, offsets = model.rpn.head(levels)
         flat = lambda parts: torch.cat([x.permute(0, 2, 3, 1).flatten(1) for x in parts], 1)
-        boxes = [torch.tensor(BOXES)] * 2
+        boxes = torch.cat([torch.cat([torch.full((len(BOXES), 1), i), torch.tensor(BOXES)], 1) for i in (0.0, 1.0)])
         heads = model.roi_heads
-        classes, shifts = heads.box_predictor(heads.box_head(heads.box_roi_pool(levels, boxes, None)))
-        masks = heads.mask_predictor(heads.mask_head(heads.mask_roi_pool(levels, boxes, None)))
+        classes, shifts = heads.box_predictor(heads.box_head(heads.box_roi_pool(levels, boxes)))
+        masks = heads.mask_predictor(heads.mask_head(heads.mask_roi_pool(levels, boxes)))
     named = {f"level {i}": level for i, level in enumerate(levels)}
     named.update({"proposal logits": flat(logits), "proposal offsets": flat(offsets)})
     return {**named, "class logits": classes, "box offsets": shifts, "mask logits": masks}

@@ -1,18 +1,15 @@
-//! Rendered photos as files, for the training in `lab/detector`: `training-crops DIR FIRST COUNT [SIDE
-//! [CLOUD]]`, with FIRST and COUNT of the photos of `stonewise train --rendered` with relief, or, with CLOUD
-//! (none, terrestrial, drone or stereo), the seeds of walls as `kept-walls` shows them.
+//! Rendered photos as files, for the training in `lab/detector`: `training-crops DIR FIRST COUNT [SIDE]`, with
+//! FIRST and COUNT of the photos of `stonewise train --rendered` with relief.
 //!
 //! Three PNG files a photo: `N.photo.png`; `N.labels.png`, whose bits 0 to 14 are the stone (0 = none) and whose
 //! bit 15 is set where nothing is known; `N.relief.png` where the photo has relief, of whose channels the first
 //! two have 0 to 255 for -1 to 1, the others for 0 to 1. Photos that are there are left as they are.
 
-use super::survey_kind;
 use crate::Outcome;
 use crate::words::Words;
 use image::{ImageBuffer, Luma, RgbImage, RgbaImage};
 use std::path::Path;
 use stonewise_segment::Sample;
-use stonewise_segment::train::synth::{MasonryStyle, Survey, masonry_photo_of};
 use stonewise_segment::train::{Rendered, SampleSource};
 
 /// Seed of the photos; those of the trainings up to run 8 were 1 to 5.
@@ -25,34 +22,20 @@ pub fn run(words: &Words) -> Outcome {
     let first: u64 = words.number_at(1).ok_or(missing)?;
     let count: u64 = words.number_at(2).ok_or(missing)?;
     let side: u32 = words.number_at(3).unwrap_or(SIDE_PX);
-    let cloud = words.as_slice().get(4);
+    let photos = Rendered {
+        seed: SEED,
+        size_px: side,
+        relief: true,
+    };
     std::fs::create_dir_all(folder)?;
     for number in first..first + count {
         let stem = folder.join(format!("{number:06}"));
         if stem.with_extension("labels.png").exists() {
             continue;
         }
-        let sample = match cloud {
-            None => training(side).sample(number)?,
-            Some(cloud) => wall(number, side, cloud),
-        };
-        write(&sample, &stem)?;
+        write(&photos.sample(number)?, &stem)?;
     }
     Ok(())
-}
-
-fn training(size_px: u32) -> Rendered {
-    Rendered {
-        seed: SEED,
-        size_px,
-        relief: true,
-    }
-}
-
-fn wall(seed: u64, side: u32, cloud: &str) -> Sample {
-    let survey = survey_kind(cloud).map(|kind| Survey::random(kind, seed));
-    let style = MasonryStyle::random(seed, side, side);
-    masonry_photo_of(&style, survey.as_ref(), seed, side, side)
 }
 
 /// Writes the files of a photo, the labels last: where they are, the others are complete.

