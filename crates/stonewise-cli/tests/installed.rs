@@ -91,7 +91,7 @@ fn the_version_is_one_line_and_its_details_name_the_weights() {
     let details = said(&["--version", "--verbose"]);
     assert!(details.starts_with(&line), "{details}");
     assert_eq!(said(&["--verbose", "--version"]), details);
-    let parts = ["1", "2", "3"].map(|n| fs::read(format!("../stonewise-weights-{n}/weights.part")).unwrap());
+    let parts = ["1", "2"].map(|n| fs::read(format!("../stonewise-weights-{n}/weights.part")).unwrap());
     let digest = blake3::hash(&parts.concat()).to_hex();
     assert!(details.contains(digest.as_str()), "{details}");
 }

@@ -58,14 +58,9 @@ impl Weights {
     }
 }
 
-/// Weights trained on rendered photos, see docs/src/method/built-in-weights.md.
+/// The bytes of the built-in weights file, see docs/src/method/built-in-weights.md.
 fn built_in() -> Vec<u8> {
-    [
-        stonewise_weights_1::PART,
-        stonewise_weights_2::PART,
-        stonewise_weights_3::PART,
-    ]
-    .concat()
+    [stonewise_weights_1::PART, stonewise_weights_2::PART].concat()
 }
 
 /// The detector of these weights. With `relief`, weights that were trained on colour alone get input channels

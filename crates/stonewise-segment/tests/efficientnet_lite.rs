@@ -10,7 +10,7 @@ use stonewise_segment::model::{
 use stonewise_segment::train::{AdamW, AdamWParams};
 use stonewise_segment::{Sample, Weights, open_model};
 
-/// A stone on a wall, and relief that no odd side fits.
+/// A stone on a wall, and relief of another size, neither that of the photo nor half of it.
 fn sample() -> Sample {
     let mut labels: LabelImage = Raster::filled(95, 61, 0);
     let noise = |i: u32| [(90 + i.wrapping_mul(2_654_435_761) % 90) as u8; 3];
@@ -40,7 +40,7 @@ fn steps_change_everything_but_the_backbone() {
     let mut model = before.clone();
     let batch = [sample(), sample().with_relief(None)];
     let mut optimizer = AdamW::new(AdamWParams::default());
-    // The relief stem's derivatives are zeros until its last layer is not.
+    // The derivatives of the relief stem are zero until the weights of its last layer are not.
     for step in 0..2 {
         let (losses, gradients) = model.gradients(&batch, step);
         assert!(losses.total().is_finite());

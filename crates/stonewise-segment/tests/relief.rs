@@ -15,7 +15,7 @@ use stonewise_segment::{Sample, Weights};
 
 const SIDE: u32 = 160;
 
-/// The built-in weights as a file for colour alone: without the tensor of relief.
+/// The built-in weights as a file for colour alone: without the tensors of relief.
 fn of_colour_alone() -> Vec<u8> {
     let bytes = Weights::BuiltIn.bytes().unwrap();
     let config = MaskRcnnConfig {
@@ -28,7 +28,7 @@ fn of_colour_alone() -> Vec<u8> {
     )]);
     let file = SafeTensors::deserialize(&bytes).unwrap();
     let tensors = file.tensors().into_iter();
-    let of_colour = tensors.filter(|(name, _)| name != "backbone.body.relief.weight");
+    let of_colour = tensors.filter(|(name, _)| !name.starts_with("backbone.relief."));
     safetensors::serialize(of_colour, Some(metadata)).unwrap()
 }
 

@@ -51,11 +51,12 @@ fn blind(folder: &Path) -> PathBuf {
     let mut bytes = Weights::BuiltIn.bytes().unwrap();
     let tensors = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
     let header: serde_json::Value = serde_json::from_slice(&bytes[8..tensors]).unwrap();
-    let offset = |end: usize| {
-        let offsets = &header["backbone.body.relief.weight"]["data_offsets"];
-        tensors + offsets[end].as_u64().unwrap() as usize
-    };
-    bytes[offset(0)..offset(1)].fill(0);
+    for (name, tensor) in header.as_object().unwrap() {
+        if name.starts_with("backbone.relief.laterals.") {
+            let offset = |end: usize| tensors + tensor["data_offsets"][end].as_u64().unwrap() as usize;
+            bytes[offset(0)..offset(1)].fill(0);
+        }
+    }
     let path = folder.join("blind.safetensors");
     fs::write(&path, bytes).unwrap();
     path

@@ -33,7 +33,7 @@ impl Backbone {
         match &config.backbone {
             BackboneConfig::Resnet(resnet) => Self::Resnet(Resnet::new(init, resnet, config.relief_channels)),
             BackboneConfig::EfficientNetLite { efficientnet_lite } => {
-                // Never zeros, so that a model whose file has no relief can learn it.
+                // Drawn at random even without a seed: a model whose file has no relief could not learn it from zeros.
                 let drawn = &mut Init::new(Some(seed.unwrap_or_default()));
                 let channels = config.relief_channels;
                 let relief = (channels > 0).then(|| ReliefStem::new(drawn, channels, config.fpn_channels));
@@ -50,7 +50,7 @@ impl Backbone {
         }
     }
 
-    /// Columns of an image for one of its relief.
+    /// Number of columns of an image per column of its relief.
     pub fn relief_step(&self) -> usize {
         match self {
             Self::Resnet(_) => 1,
@@ -59,7 +59,7 @@ impl Backbone {
     }
 
     /// Features of images [batch, 3, rows, columns] and, where there is any, their relief [batch, relief, rows /
-    /// step, columns / step], of which each image's is `present` or zeros.
+    /// step, columns / step], which is zeros for images where it is not `present`.
     pub fn forward(&self, images: &Tensor, relief: Option<&Tensor>, present: &[bool]) -> Features {
         match self {
             Self::Resnet(resnet) => Features {

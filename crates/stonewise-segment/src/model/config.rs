@@ -40,7 +40,7 @@ pub enum Norm {
 pub enum BackboneConfig {
     /// A residual network.
     Resnet(ResnetConfig),
-    /// EfficientNet-Lite (Tan & Le 2019, without squeeze-and-excitation). Training leaves its weights alone.
+    /// EfficientNet-Lite (Tan & Le 2019, without squeeze-and-excitation). Training does not change its weights.
     EfficientNetLite {
         /// Which one: 0, 1 or 2.
         efficientnet_lite: usize,
@@ -130,8 +130,8 @@ pub struct MaskRcnnConfig {
     pub pixel_std: [f32; 3],
     /// Channels of [relief](stonewise_core::raster::ReliefMap) that the model takes beside colour, 0 where it
     /// has not learnt relief. In a residual network they have a convolution of their own, whose output is added to
-    /// that of the colours: a wider first layer, of which colour alone uses its part. Beside EfficientNet-Lite they
-    /// have a stem, which takes relief of half the rows and columns and is joined at the feature pyramid.
+    /// that of the colours: a wider first layer, of which colour alone uses its part. With EfficientNet-Lite they
+    /// have a stem of their own, which takes relief of half the rows and columns and is joined at the feature pyramid.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub relief_channels: usize,
     /// Size at which images are looked at; `None` as they are.
@@ -264,8 +264,8 @@ impl MaskRcnnConfig {
         }
     }
 
-    /// The model of `lab/detector` on EfficientNet-Lite`size`, which only a file of weights makes useful: its backbone
-    /// is never trained here.
+    /// The model of `lab/detector` on EfficientNet-Lite`size`, of use only with weights from a file, because its
+    /// backbone is never trained here.
     pub fn efficientnet_lite(size: usize) -> Self {
         Self {
             // Values 0 to 255 enter as (value - 127) / 128.

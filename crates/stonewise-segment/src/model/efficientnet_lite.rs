@@ -19,7 +19,7 @@ const STAGES: [[usize; 5]; 7] = [
 ];
 /// Stages whose outputs are the features of strides 4, 8, 16 and 32.
 const TAPS: [usize; 4] = [1, 2, 4, 6];
-/// Factors of channels and of repeats of Lite0, Lite1 and Lite2, tenths.
+/// Factors of channels and of repeats of Lite0, Lite1 and Lite2, in tenths.
 const SCALES: [[usize; 2]; 3] = [[10, 10], [10, 11], [11, 12]];
 
 /// The stages of Lite`size`; the first and the last are not repeated.
@@ -56,7 +56,7 @@ struct Layer {
 }
 
 impl Layer {
-    /// `inputs`: channels that an output sees.
+    /// `inputs`: input channels of each output channel (1 for a depthwise convolution).
     fn new(init: &mut Init, [inputs, outputs]: [usize; 2], size: usize, stride: usize) -> Self {
         let std = (2.0 / (inputs * size * size) as f32).sqrt();
         let fixed = |param| Param {
@@ -101,7 +101,7 @@ impl Block {
     }
 
     fn forward(&self, x: &Tensor) -> Tensor {
-        // ReLU6 of what it gets: the expansion's, and in the block without one the stem's.
+        // It applies ReLU6 to its input first: the output of the expansion or, in the block without one, of the stem.
         let Layer { weight, bias, stride } = &self.depthwise;
         let depthwise = |x: &Tensor| x.depthwise_between_relu6(&weight.tensor, &bias.tensor, *stride);
         let y = match &self.expand {

@@ -30,8 +30,8 @@ impl Fpn {
         blocks.for_each(ConvBlock::prepare);
     }
 
-    /// Levels of strides 4, 8, 16, 32 and 64, finest first. The image's sides must be multiples of 32. What relief adds
-    /// comes to the levels before they are joined.
+    /// Levels of strides 4, 8, 16, 32 and 64, finest first. The image's sides must be multiples of 32. The
+    /// contributions of relief are added before coarse levels are added to finer ones.
     pub fn forward(&self, features: Features) -> Vec<Tensor> {
         let mut relief = features.relief.into_iter().rev();
         let mut levels = Vec::with_capacity(5);

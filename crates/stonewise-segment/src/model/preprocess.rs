@@ -64,9 +64,8 @@ pub fn batch(images: &[&RgbImage], seen: &[Seen], config: &MaskRcnnConfig) -> Te
     Tensor::new([images.len(), 3, height, width], values)
 }
 
-/// Relief [batch, channels, rows, columns] of a batch of images, padded to `width` columns and `height` rows of the
-/// images, with one column and row for every `step` of them; zeros where an image has none; `None` where no image has
-/// any.
+/// Relief [batch, channels, rows, columns] of a batch of images padded to `size` (columns, rows), with one column and
+/// row for every `step` of the images; zeros where an image has none; `None` where no image has any.
 pub fn relief_batch(
     reliefs: &[Option<&ReliefMap>],
     seen: &[Seen],
@@ -184,7 +183,7 @@ mod tests {
 
     #[test]
     fn relief_of_half_the_rows_and_columns_keeps_its_place() {
-        // Of the same size as a photo of odd sides; values are places of the photo, pixels.
+        // Relief as large as a photo with odd sides; its values are positions in the photo, pixels.
         let pixel = |i: u32| [(i % 51) as f32 + 0.5, (i / 51) as f32 + 0.5, 0.0, 1.0];
         let relief = Raster::from_vec(51, 31, (0..51 * 31).map(pixel).collect()).unwrap();
         let seen = [Seen::new(&ramp(51, 31), None)];

@@ -1,4 +1,4 @@
-//! Relief to what it adds to the levels of a feature pyramid.
+//! The stem of relief: what relief adds to the levels of a feature pyramid.
 
 use super::config::Norm as NormConfig;
 use super::init::Init;
@@ -35,7 +35,7 @@ impl ReliefStem {
     }
 
     /// What relief [batch, channels, rows, columns] of half an image's rows and columns adds to the levels of strides
-    /// 4, 8, 16 and 32 of the image, finest first; nothing to images of which none is `present`.
+    /// 4, 8, 16 and 32 of the image, finest first; zeros for images whose relief is not `present`.
     pub fn forward(&self, relief: &Tensor, present: &[bool]) -> Vec<Tensor> {
         let mut x = relief.clone();
         let mut levels = Vec::with_capacity(WIDTHS.len());

@@ -86,7 +86,7 @@ fn configurations_name_their_backbone() {
     assert_eq!(exported, MaskRcnnConfig::efficientnet_lite(0).with_relief());
     let text = serde_json::to_string(&exported).unwrap();
     assert_eq!(serde_json::from_str::<MaskRcnnConfig>(&text).unwrap(), exported);
-    // As the built-in weights have it.
+    // As files of residual networks have it.
     let today = r#"{"depth":"R18","width":64,"norm":{"group":{"groups":16}}}"#;
     let backbone: BackboneConfig = serde_json::from_str(today).unwrap();
     let resnet = ResnetConfig {

@@ -102,7 +102,7 @@ pub enum WeightsError {
 }
 
 /// Replaces all parameters of a model by those of a file. A file of colour alone fits a model with relief,
-/// too: the first or last weights of relief become zeros, and the model does what it did without.
+/// too: the convolutions whose output is added become zeros, and the model does what it did without.
 ///
 /// # Errors
 /// The file cannot be read, lacks a parameter, has one too many or one of another shape.

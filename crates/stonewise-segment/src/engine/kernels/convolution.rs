@@ -11,7 +11,7 @@ const BLOCK: usize = 1 << 17;
 /// Minimum number of columns of a block, if the result has that many: products with fewer are slow.
 const LEAST_COLUMNS: usize = 96;
 
-/// Sizes of a convolution with an odd size of kernel.
+/// Sizes of a convolution; the kernel has an odd size.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry {
     pub batch: usize,
@@ -21,7 +21,7 @@ pub struct Geometry {
     pub outputs: usize,
     pub size: usize,
     pub stride: usize,
-    /// Padded as `SAME` says, else by half the size of the kernel on all sides.
+    /// Whether the padding is TensorFlow's `SAME`; otherwise half the kernel's size on all sides.
     pub is_same: bool,
 }
 
@@ -426,7 +426,7 @@ mod tests {
     fn for_each_product(g: &Geometry, mut each: impl FnMut(usize, usize, usize)) {
         let [rows, columns] = g.output_size();
         let before = |side: usize| {
-            // lab/detector/lite0.py: zeros that are needed, half of them before.
+            // As lab/detector/lite.py pads: half of the zeros needed, rounded down, come first.
             let needed = ((side.div_ceil(g.stride) - 1) * g.stride + g.size).saturating_sub(side);
             if g.is_same { needed / 2 } else { g.size / 2 }
         };

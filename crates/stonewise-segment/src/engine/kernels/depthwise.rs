@@ -26,18 +26,19 @@ impl Depthwise {
         [self.rows, self.columns].map(|side| side.div_ceil(self.stride))
     }
 
-    /// Length of the parts of a padded row: one for every place of a column between two strides.
+    /// Length of one part of a padded row, which is stored as `stride` parts: part p holds columns p, p + stride,
+    /// p + 2 stride, ...
     fn part(&self) -> usize {
         self.output_size()[1].next_multiple_of(LANES) + (self.size - 1) / self.stride
     }
 
-    /// Output rows for which padded rows are held at once.
+    /// Number of output rows whose padded input rows are held at once.
     fn rows_at_once(&self) -> usize {
         let rows = HELD / (self.stride * self.part());
         rows.saturating_sub(self.size) / self.stride + 1
     }
 
-    /// ReLU6 of the input rows that some output rows see, with zeros around.
+    /// Writes ReLU6 of the input rows that the output rows in `range` need to `held`, padded with zeros.
     fn hold(&self, x: &[f32], range: &Range<usize>, held: &mut [f32]) {
         let [above, before] =
             [self.rows, self.columns].map(|side| same_padding(side, self.size, self.stride));
@@ -60,7 +61,7 @@ impl Depthwise {
         }
     }
 
-    /// Where the weights' inputs lie in the padded rows, seen from the first of an output row.
+    /// Offset of each weight's input in the padded rows from the first input of an output row.
     fn offsets(&self) -> Vec<usize> {
         let offset = |tap: usize| {
             let [row, column] = [tap / self.size, tap % self.size];
@@ -151,7 +152,7 @@ mod tests {
                 let y = forward(&x, &weight, &bias, &shape);
                 let size_out = [rows.div_ceil(stride), columns.div_ceil(stride)];
                 assert_eq!(y.len(), 2 * channels * size_out[0] * size_out[1]);
-                // lab/detector/lite0.py: zeros that are needed, half of them before.
+                // As lab/detector/lite.py pads: half of the zeros needed, rounded down, come first.
                 let zeros =
                     |side: usize| ((side.div_ceil(stride) - 1) * stride + size).saturating_sub(side) / 2;
                 for (place, y) in y.into_iter().enumerate() {
