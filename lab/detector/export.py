@@ -10,7 +10,10 @@ import argparse
 import json
 import struct
 
-BN_EPSILON = 1e-3
+import torch
+
+from lite import Lite
+
 BODY = "backbone.body."
 # Key of the configuration (crates/stonewise-segment/src/model/weights.rs).
 CONFIG_KEY = "stonewise_model"
@@ -48,26 +51,6 @@ def config(lite, relief):
     }
 
 
-def body(stored):
-    """Weights of the backbone from the package's, any of Lite0 to Lite2."""
-    weights = {}
-
-    def fold(name, kernel, norm):
-        scale = stored[f"{norm}.weight"] / (stored[f"{norm}.running_var"] + BN_EPSILON).sqrt()
-        weights[f"{BODY}{name}.weight"] = stored[f"{kernel}.weight"] * scale[:, None, None, None]
-        weights[f"{BODY}{name}.bias"] = stored[f"{norm}.bias"] - stored[f"{norm}.running_mean"] * scale
-
-    fold("stem", "_conv_stem", "_bn0")
-    number = 0
-    while f"_blocks.{number}._project_conv.weight" in stored:
-        theirs, ours = f"_blocks.{number}.", f"blocks.{number}."
-        for part, norm in ("expand", "_bn0"), ("depthwise", "_bn1"), ("project", "_bn2"):
-            if f"{theirs}_{part}_conv.weight" in stored:
-                fold(ours + part, f"{theirs}_{part}_conv", theirs + norm)
-        number += 1
-    return weights
-
-
 def safetensors(weights, metadata):
     """A file of half-precision tensors: length of the header, header, values."""
     header, parts, end = {"__metadata__": metadata}, [], 0
@@ -84,8 +67,6 @@ def safetensors(weights, metadata):
 
 
 def main():
-    import torch
-
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("model")
     parser.add_argument("out")
@@ -93,8 +74,8 @@ def main():
     parser.add_argument("--provenance", help="what the weights were trained on and how, kept in the file")
     args = parser.parse_args()
     model = torch.load(args.model, map_location="cpu")
-    package = {name: value.float() for name, value in torch.load(args.backbone, map_location="cpu").items()}
-    weights = {**body(package), **model["weights"]}
+    body = Lite(model.get("size", 0)).load_package(args.backbone).state_dict()
+    weights = {**{BODY + name: value for name, value in body.items()}, **model["weights"]}
     relief = any(name.startswith("backbone.relief.") for name in weights)
     metadata = {CONFIG_KEY: json.dumps(config(model.get("size", 0), relief), separators=(",", ":"))}
     if args.provenance:

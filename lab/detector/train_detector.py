@@ -83,13 +83,17 @@ class Training:
             state = {}
         self.mean = state.get("mean") or {name: p.detach().clone() for name, p in names.items()}
 
+    def tune(self, is_tuned):
+        """Trains the backbone's blocks from the first of stride 8 on, where that was asked for, or none of them."""
+        body = self.model.backbone.body
+        body.learnt_from = self.first_learnt if is_tuned and self.body else len(body.blocks)
+        for p in self.body:
+            p.requires_grad_(is_tuned)
+
     def choose_layout(self, images, relief, present):
         """Keeps images and weights in the memory layout that is faster on this device."""
-        body, times = self.model.backbone.body, {}
-        learnt_from, body.learnt_from = body.learnt_from, self.first_learnt if self.body else body.learnt_from
-        for p in self.body:
-            p.requires_grad_(True)
-        begun = 0.0
+        times, begun = {}, 0.0
+        self.tune(True)
         for layout in (torch.channels_last, torch.contiguous_format):
             self.model.layout = layout
             self.model.to(memory_format=layout)
@@ -103,9 +107,7 @@ class Training:
         best = min(times, key=times.get)
         self.model.layout = best
         self.model.to(memory_format=best)
-        body.learnt_from = learnt_from
-        for p in self.body:
-            p.requires_grad_(False)
+        self.tune(False)
         self.optimizer.zero_grad(set_to_none=True)
         self.mean = {name: p.detach().clone() for name, p in self.parameters.items()}
         print(f"seconds for features: {times}; {best}", flush=True)
@@ -116,11 +118,8 @@ class Training:
 
     def learn(self, images, relief, present, targets):
         """One step; returns the losses as one tensor."""
-        body = self.model.backbone.body
-        if self.body and self.done() >= self.args.tune_from and body.learnt_from > self.first_learnt:
-            body.learnt_from = self.first_learnt
-            for p in self.body:
-                p.requires_grad_(True)
+        if self.done() >= self.args.tune_from:
+            self.tune(True)
         rate = self.args.rate * min(1, (self.step + 1) / self.args.warmup)
         rate *= 0.5 + 0.5 * math.cos(math.pi * min(1, self.done()))
         for group in self.optimizer.param_groups:

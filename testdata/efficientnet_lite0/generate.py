@@ -14,7 +14,7 @@ from efficientnet_lite_pytorch import EfficientNet
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent / "mask_rcnn"))
-from formula import image, parameter, unit
+from formula import described, image, parameter, unit
 
 WIDTH, HEIGHT = 96, 64
 VALUES = 12
@@ -39,18 +39,10 @@ def outputs():
     return seen
 
 
-def described(name, output):
-    places = ((unit(name, VALUES) + 1) / 2 * output.size).astype(int)
-    digits = lambda value: float(f"{value:.7g}")
-    return {
-        "name": name,
-        "shape": list(output.shape),
-        "rms": digits(np.sqrt((output.astype(np.float64) ** 2).mean())),
-        "places": places.tolist(),
-        "values": [digits(v) for v in output.ravel()[places]],
-    }
+def places(name, output):
+    return ((unit(name, VALUES) + 1) / 2 * output.size).astype(int)
 
 
 names = ["stem"] + [f"block {i}" for i in range(16)]
-lines = [json.dumps(described(name, output)) for name, output in zip(names, outputs(), strict=True)]
+lines = [json.dumps(described(name, output, places(name, output))) for name, output in zip(names, outputs(), strict=True)]
 (HERE / "expected.json").write_text("[\n" + ",\n".join(lines) + "\n]\n")

@@ -14,7 +14,7 @@ import torch
 HERE = Path(__file__).parent
 sys.path += [str(HERE.parent / "mask_rcnn"), str(HERE.parents[1] / "lab" / "detector")]
 from export import config
-from formula import image, parameter, unit
+from formula import described, image, parameter, unit
 from model import Detector
 
 WIDTH, HEIGHT = 128, 96
@@ -44,22 +44,14 @@ def outputs():
     return {**named, "class logits": classes, "box offsets": shifts, "mask logits": masks}
 
 
-def described(name, output):
-    output = output.numpy()
+def places(name, output):
+    """As many of the first image as of the second."""
     half = output.size // 2
-    # As many of the first image as of the second.
-    places = ((unit(name, VALUES) + 1) / 2 * half).astype(int) + half * (np.arange(VALUES) % 2)
-    digits = lambda value: float(f"{value:.7g}")
-    return {
-        "name": name,
-        "shape": list(output.shape),
-        "rms": digits(np.sqrt((output.astype(np.float64) ** 2).mean())),
-        "places": places.tolist(),
-        "values": [digits(v) for v in output.ravel()[places]],
-    }
+    return ((unit(name, VALUES) + 1) / 2 * half).astype(int) + half * (np.arange(VALUES) % 2)
 
 
-lines = [json.dumps(described(name, output)) for name, output in outputs().items()]
+found = {name: output.numpy() for name, output in outputs().items()}
+lines = [json.dumps(described(name, output, places(name, output))) for name, output in found.items()]
 (HERE / "expected.json").write_text(
     f'{{"config": {json.dumps(config(0, True))},\n"boxes": {json.dumps(BOXES)},\n"outputs": [\n'
     + ",\n".join(lines) + "\n]}\n"

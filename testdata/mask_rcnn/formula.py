@@ -55,3 +55,15 @@ def image(width, height):
     value = (block * 37 + c * 61) % 160 + (x * 7 + y * 3 + c * 5) % 29 + 20
     edge = ((x % 23) < 2) | (((y + 5 * (x // 23)) % 17) < 2)
     return np.where(edge, 30 + (x + y) % 11, value).astype(np.uint8)
+
+
+def described(name, output, places):
+    """Name, shape, root mean square and the values at row-major places of an array."""
+    digits = lambda value: float(f"{value:.7g}")
+    return {
+        "name": name,
+        "shape": list(output.shape),
+        "rms": digits(np.sqrt((output.astype(np.float64) ** 2).mean())),
+        "places": places.tolist(),
+        "values": [digits(v) for v in output.ravel()[places]],
+    }
