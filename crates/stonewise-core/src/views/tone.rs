@@ -3,21 +3,26 @@
 use super::walls::Walls;
 use crate::cloud::Cloud;
 use crate::geometry::{CellMap, cell_of, cells_between, floor};
+use crate::statistics::upper_median;
 use nalgebra::Point3;
 use rayon::prelude::*;
 
 /// Edge of the cells in which intensities are brought to one level, metres: range and incidence hardly change
 /// within them, and they hold several stones.
 const CELL_M: f64 = 1.0;
-/// Fewest points of a cell that says something about contrast.
-const LEAST_POINTS: f64 = 50.0;
+/// Patches along the edge of a cell. Contrast is the spread of their means, which keep differences between stones and
+/// average out the noise of points.
+const PATCHES: i64 = 10;
+/// Fewest points of a patch, and fewest such patches of a cell, for which contrast is computed.
+const LEAST_POINTS: f64 = 2.0;
+const LEAST_PATCHES: f64 = 10.0;
 /// Grey of a point of mean intensity, and how much brighter one is that lies a standard deviation above.
 const MIDDLE: f64 = 110.0;
 const SPREAD: f64 = 22.0;
 /// Part of the points that must have a colour other than black.
 const LEAST_COLOURED: f64 = 0.5;
-/// Least typical deviation from the mean of a cell, as a part of this mean, with which colours or intensities
-/// show stones.
+/// Least typical deviation of patches from the mean of their cell, as a part of this mean, with which colours or
+/// intensities show stones.
 const LEAST_CONTRAST: f64 = 0.03;
 /// Part of the points that may be brighter than white.
 const OVEREXPOSED: f64 = 0.01;
@@ -54,8 +59,8 @@ pub struct Tones {
     coloured: u64,
     /// Points by the high byte and by the low byte of their brightness.
     bytes: [Vec<u64>; 2],
-    colours: Levels,
-    intensities: Levels,
+    colours: Patches,
+    intensities: Patches,
 }
 
 impl Tones {
@@ -77,7 +82,7 @@ impl Tones {
         }
     }
 
-    /// What views of the epoch show best: colours that most points have and that differ within a metre, else
+    /// What views of the epoch show best: colours that most points have and that differ from patch to patch, else
     /// intensities that differ, else relief.
     pub fn decide(self) -> Toning {
         let are_coloured = self.coloured as f64 > LEAST_COLOURED * self.points as f64;
@@ -107,8 +112,7 @@ impl Tones {
         Toning {
             shade,
             gain: unit * (BRIGHT / white).clamp(1.0, MOST_BRIGHTENING),
-            contrast: self.intensities.contrast(),
-            intensities: self.intensities,
+            intensities: self.intensities.levels(),
         }
     }
 }
@@ -118,8 +122,6 @@ pub struct Toning {
     shade: Shade,
     /// Factor of 16-bit colours.
     gain: f64,
-    /// Typical standard deviation of intensities within a cell, as a part of their mean.
-    contrast: f64,
     intensities: Levels,
 }
 
@@ -139,7 +141,7 @@ impl Toning {
                 let (mean, deviation) = self.intensities.at(values.sources[i], &cloud.world(i));
                 // Where nothing differs, noise stays small.
                 let unit = deviation
-                    .max(0.5 * self.contrast * mean.abs())
+                    .max(0.5 * self.intensities.deviation * mean.abs())
                     .max(f64::MIN_POSITIVE);
                 let difference = (f64::from(values.intensities[i]) - mean) / unit;
                 [byte(MIDDLE + SPREAD * difference); 3]
@@ -154,44 +156,102 @@ impl Toning {
     }
 }
 
-/// Level and spread of values by place and source.
+/// Values by place and source, in the patches of cells.
 #[derive(Default)]
-struct Levels(CellMap<Key, Moments>);
+struct Patches(CellMap<Key, Moments>);
 
-/// Source and cell.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+/// Source and cell or patch.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 struct Key(u32, [i64; 3]);
 
-impl Levels {
+impl Patches {
     fn add(&mut self, source: u32, place: &Point3<f64>, value: f64) {
-        let moments = self.0.entry(Key(source, cell_of(place, CELL_M))).or_default();
-        moments.add(value);
+        let patch = cell_of(place, CELL_M / PATCHES as f64);
+        self.0.entry(Key(source, patch)).or_default().add(value);
     }
 
+    /// The patches merged by cell.
+    fn cells(&self) -> CellMap<Key, Cell> {
+        let mut patches: Vec<(&Key, &Moments)> = self.0.iter().collect();
+        patches.sort_by_key(|(key, _)| **key);
+        let mut cells: CellMap<Key, Cell> = CellMap::default();
+        for (Key(source, patch), moments) in patches {
+            let key = Key(*source, patch.map(|place| place.div_euclid(PATCHES)));
+            cells.entry(key).or_default().add(moments);
+        }
+        cells
+    }
+
+    /// Median of [`Cell::contrast`] over the cells.
+    fn contrast(&self) -> f64 {
+        let mut contrasts: Vec<f64> = self.cells().values().filter_map(Cell::contrast).collect();
+        upper_median(&mut contrasts).unwrap_or(0.0)
+    }
+
+    fn levels(self) -> Levels {
+        let cells = self.cells();
+        let deviation = |cell: &Cell| {
+            let (mean, deviation) = cell.points.mean_and_deviation();
+            (cell.patches.count >= LEAST_PATCHES).then(|| deviation / mean.abs().max(f64::MIN_POSITIVE))
+        };
+        let mut deviations: Vec<f64> = cells.values().filter_map(deviation).collect();
+        Levels {
+            deviation: upper_median(&mut deviations).unwrap_or(0.0),
+            cells: cells.into_iter().map(|(key, cell)| (key, cell.points)).collect(),
+        }
+    }
+}
+
+/// What the points of a cell show.
+#[derive(Clone, Copy, Default)]
+struct Cell {
+    points: Moments,
+    /// Means of the patches with enough points.
+    patches: Moments,
+    /// Sum of the variances of these means due to the scatter of the points within the patches.
+    noise: f64,
+}
+
+impl Cell {
+    fn add(&mut self, patch: &Moments) {
+        self.points.merge(patch, 1.0);
+        if patch.count >= LEAST_POINTS {
+            let (mean, deviation) = patch.mean_and_deviation();
+            self.patches.add(mean);
+            self.noise += deviation.powi(2) / (patch.count - 1.0);
+        }
+    }
+
+    /// Standard deviation of the means of the patches, corrected for noise, as a part of their mean; `None` with too few
+    /// patches.
+    fn contrast(&self) -> Option<f64> {
+        let count = self.patches.count;
+        let (mean, deviation) = self.patches.mean_and_deviation();
+        let variance = deviation.powi(2) * count / (count - 1.0) - self.noise / count;
+        (count >= LEAST_PATCHES).then(|| variance.max(0.0).sqrt() / mean.abs().max(f64::MIN_POSITIVE))
+    }
+}
+
+/// Level and spread of values by place and source.
+struct Levels {
+    cells: CellMap<Key, Moments>,
+    /// Typical standard deviation within a cell, as a part of its mean.
+    deviation: f64,
+}
+
+impl Levels {
     /// Mean and standard deviation around a place: of the eight cells around it, the nearer the more.
     fn at(&self, source: u32, place: &Point3<f64>) -> (f64, f64) {
         let low = [0, 1, 2].map(|axis| floor(place[axis] / CELL_M - 0.5));
         let mut around = Moments::default();
         for cell in cells_between(low, low.map(|c| c + 1)) {
-            if let Some(moments) = self.0.get(&Key(source, cell)) {
+            if let Some(moments) = self.cells.get(&Key(source, cell)) {
                 let apart = |axis: usize| (place[axis] / CELL_M - 0.5 - cell[axis] as f64).abs();
                 let weight: f64 = (0..3).map(|axis| (1.0 - apart(axis)).max(0.0)).product();
                 around.merge(moments, weight);
             }
         }
         around.mean_and_deviation()
-    }
-
-    /// Median of the standard deviations within cells, as parts of the means.
-    fn contrast(&self) -> f64 {
-        let cells = self.0.values().filter(|m| m.count >= LEAST_POINTS);
-        let contrast = |m: &Moments| {
-            let (mean, deviation) = m.mean_and_deviation();
-            deviation / mean.abs().max(f64::MIN_POSITIVE)
-        };
-        let mut contrasts: Vec<f64> = cells.map(contrast).collect();
-        contrasts.sort_by(f64::total_cmp);
-        contrasts.get(contrasts.len() / 2).copied().unwrap_or(0.0)
     }
 }
 
@@ -232,6 +292,7 @@ fn brightness(colour: [u16; 3]) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::statistics::split_mix;
     use nalgebra::Point3;
 
     /// A wall of 4 x 3 m in chequers of 25 cm, a point every 2 cm.
@@ -324,5 +385,11 @@ mod tests {
         assert_eq!(shade, Shade::Colour);
         // 8 bits in the 16 of a LAS file.
         assert_eq!(look(&grey(100, 200), &strong), (Shade::Colour, wide));
+        // Points that differ by a quarter of their mean, but not from patch to patch.
+        let noise = |i: usize| 100.0 + 25.0 * if split_mix(i as u64) % 2 == 0 { 1.0 } else { -1.0 };
+        let noisy: Vec<f32> = (0..cloud.len()).map(|i| noise(i) as f32).collect();
+        assert_eq!(look(&grey(0, 0), &noisy).0, Shade::Relief);
+        let both: Vec<f32> = noisy.iter().zip(&strong).map(|(a, b)| a + b).collect();
+        assert_eq!(look(&grey(0, 0), &both).0, Shade::Intensity);
     }
 }
