@@ -16,9 +16,6 @@ const STRIDE: f64 = 0.25;
 /// Fewest stones of a bulge, and the share of its amplitude from which a stone is one of them: what moves less is the rim.
 const LEAST_STONES: usize = 3;
 pub(crate) const RIM: f64 = 0.25;
-/// Standard deviations up to which the residual of a stone counts: one stone in a hundred has more by chance (chi-square,
-/// three degrees of freedom; Huber 1964), so that no single stone makes a bulge.
-pub(crate) const LARGEST_RESIDUAL: f64 = 3.368;
 /// Numbers of the directions along the wall and up.
 pub(crate) const IN_FACE: [usize; 2] = [0, 1];
 /// Number of the direction out of the wall.
@@ -29,8 +26,16 @@ pub(crate) struct Shape {
     /// Where it is largest.
     pub middle: Point3<f64>,
     pub diameter_m: f64,
-    /// Stones and by how much of the amplitude they move, cos^2(pi r / diameter).
+    /// Stones and by how much of the amplitude they move.
     pub stones: Vec<(usize, f64)>,
+}
+
+/// Share of its amplitude by which a bulge moves a point at this distance from its middle: cos^2(pi r / diameter).
+pub(crate) fn share(distance_m: f64, diameter_m: f64) -> f64 {
+    match distance_m < 0.5 * diameter_m {
+        true => (PI * distance_m / diameter_m).cos().powi(2),
+        false => 0.0,
+    }
 }
 
 /// All bulges of these stones, with one middle in each small cell that has stones.
@@ -41,11 +46,12 @@ pub(crate) fn shapes(stones: &[usize], place: impl Fn(usize) -> Point3<f64> + Sy
         let near = Cells::new(stones, 0.5 * diameter_m, &place);
         let of_middle = |cell: &Vec<usize>| {
             let middle = place(*cell.first()?);
-            let share = |i: usize| {
-                let r = (place(i) - middle).norm();
-                (r < 0.5 * diameter_m).then(|| (i, (PI * r / diameter_m).cos().powi(2)))
-            };
-            let stones: Vec<(usize, f64)> = near.around(&middle).filter_map(share).collect();
+            let of_stone = |i: usize| (i, share((place(i) - middle).norm(), diameter_m));
+            let stones = near
+                .around(&middle)
+                .map(of_stone)
+                .filter(|(_, share)| *share > 0.0);
+            let stones: Vec<(usize, f64)> = stones.collect();
             let inside = stones.iter().filter(|(_, share)| *share > RIM).count();
             (inside >= LEAST_STONES).then_some(Shape {
                 middle,

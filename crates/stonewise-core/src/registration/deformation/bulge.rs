@@ -2,7 +2,7 @@
 
 use super::body::Body;
 use crate::registration::bulges::RIM;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3, Vector6};
 
 /// What the observations can show of a bulge's amplitude in one direction.
 #[derive(Clone, Copy)]
@@ -11,6 +11,8 @@ pub(super) struct Direction {
     pub score_sd: f64,
     /// Information on the amplitude: the score of a bulge of one metre.
     pub information: f64,
+    /// Cross-information of the amplitude and the rigid motion.
+    pub with_rigid: Vector6<f64>,
 }
 
 impl Direction {
@@ -30,8 +32,28 @@ impl Direction {
     }
 }
 
+/// An absolute standardised score.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Score {
+    pub whole: f64,
+    /// Without its largest stone: the one that adds most to it.
+    pub without_largest: f64,
+}
+
+impl Score {
+    /// The one that is larger without its largest stone.
+    pub fn larger(self, other: Self) -> Self {
+        match other.without_largest > self.without_largest {
+            true => other,
+            false => self,
+        }
+    }
+}
+
 /// A bulge of some place and size in three directions: along, up and out.
 pub(super) struct Bulge {
+    /// Where it is largest.
+    pub middle: Point3<f64>,
     pub diameter_m: f64,
     /// Stones and by how much of the amplitude they move.
     pub stones: Vec<(usize, f64)>,
@@ -45,19 +67,41 @@ impl Bulge {
         self.stones.iter().map(|(i, share)| rest[*i] * *share).sum()
     }
 
-    /// The largest score of any direction in standard deviations.
-    pub fn largest(&self, rest: &[Vector3<f64>]) -> f64 {
-        let score = self.scores(rest);
-        let z = |k: usize| self.directions[k].map_or(0.0, |d| d.standardised(score[k]).abs());
-        z(0).max(z(1)).max(z(2))
+    /// The score in each direction; 0 where it cannot be observed. `rest`: residual of each stone about the rigid motion.
+    pub fn standardised(&self, rest: &[Vector3<f64>]) -> [Score; 3] {
+        let (mut sum, mut least, mut most) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
+        for (i, share) in &self.stones {
+            let added: Vector3<f64> = rest[*i] * *share;
+            sum += added;
+            least = least.inf(&added);
+            most = most.sup(&added);
+        }
+        std::array::from_fn(|k| {
+            let [sum, largest] = match sum[k] < 0.0 {
+                true => [-sum[k], -least[k]],
+                false => [sum[k], most[k]],
+            };
+            self.directions[k].map_or_else(Score::default, |direction| Score {
+                whole: direction.standardised(sum),
+                without_largest: direction.standardised(sum - largest).max(0.0),
+            })
+        })
     }
 
-    /// Its stones and amplitude in the direction of the largest score. `left_over`: of the observations, and of what they
-    /// show beyond the motions. `None` where nothing shows it.
+    /// The largest score of any direction.
+    pub fn largest(&self, rest: &[Vector3<f64>]) -> Score {
+        self.standardised(rest)
+            .into_iter()
+            .fold(Score::default(), Score::larger)
+    }
+
+    /// Its stones and amplitude in the direction whose score, without its largest stone, is largest. `left_over`: of the
+    /// observations, and of what they show beyond the motions. `None` where nothing shows it.
     pub fn most_likely(&self, left_over: &[Vec<Vector3<f64>>; 2]) -> Option<MostLikely> {
         let [score, smoothed] = left_over.each_ref().map(|rest| self.scores(rest));
         let shown = |k: usize| Some((k, self.directions[k]?));
-        let size = |(k, direction): &(usize, Direction)| direction.standardised(score[*k]).abs();
+        let standardised = self.standardised(&left_over[0]);
+        let size = |(k, _): &(usize, Direction)| standardised[*k].without_largest;
         let (number, direction) = (0..3)
             .filter_map(shown)
             .max_by(|a, b| size(a).total_cmp(&size(b)))?;
@@ -93,7 +137,7 @@ pub(super) fn add_squares(
     }
 }
 
-/// The bulge of the largest score.
+/// The bulge of the largest score without its largest stone.
 pub(super) struct MostLikely {
     /// Stones that move by more than a quarter of its amplitude, with their share of it.
     pub stones: Vec<(usize, f64)>,

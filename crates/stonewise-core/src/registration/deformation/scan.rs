@@ -3,17 +3,19 @@
 //! A bulge b with amplitude a about a rigid motion: y_i = J_i r + a b_i + L_i u + e_i, where the stone's observations
 //! give y_i with information M_i and L_i u are errors that stones share. With r estimated by least squares, the score
 //! of the bulge is s = sum b_i' (v_i - M_i J_i r), linear in the observations; s^2 / var(s) is twice the log
-//! likelihood ratio of the bulge. The test is the largest of all bulges. No variance is estimated under the
-//! alternative, so that nothing lies at a bound (compare Self & Liang 1987), and what its largest value is on a
-//! wall that moved as one body is simulated from the same model. What is left over of a stone counts up to a limit, here
-//! and there (Huber 1964), so that no single stone is called a deformation of the wall.
+//! likelihood ratio of the bulge. The test statistic is the maximum over all bulges of (|s| - c) / sd(s), where c is the
+//! largest contribution of a stone: a bulge must also show in its other stones, so that no single stone is called a
+//! deformation of the wall. No variance is estimated under the alternative, so that nothing lies at a bound (compare
+//! Self & Liang 1987), and the maximum on a wall that moved as one body is simulated from the same model. Residuals are
+//! limited, for the observations and the simulations alike (Huber 1964), so that a stone that moved by itself does not
+//! distort the rigid motion.
 
 use super::body::{Body, BodyStone};
-use super::bulge::{Bulge, Direction, MostLikely};
+use super::bulge::{Bulge, Direction, MostLikely, Score};
 use super::found::{LEVEL, OUTSIDE, ZONE_EXTENTS_M};
 use super::random::Random;
 use super::smoothed::smoothed;
-use crate::registration::bulges::{IN_FACE, LARGEST_RESIDUAL, OUT, Shape, shapes};
+use crate::registration::bulges::{self, IN_FACE, OUT, Shape, shapes};
 use crate::statistics::upper_median;
 use nalgebra::{Const, Dyn, Matrix3, Matrix6, OMatrix, SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
@@ -25,6 +27,9 @@ const SIMULATIONS: usize = 999;
 const LEAST_SHARE: f64 = 0.02;
 /// Standard deviations by which a bulge must exceed the limit of the test to be found in 95 of 100 cases.
 const POWER: f64 = 1.645;
+/// Standard deviations up to which the residual of a stone counts: one in a million has more by chance (chi-square, three
+/// degrees of freedom).
+const LARGEST_RESIDUAL: f64 = 5.538;
 /// Rounds in which the rigid motion and what counts of the residuals follow each other.
 const ROUNDS: usize = 6;
 /// Share of its trace that is added to a covariance in its null directions.
@@ -38,7 +43,7 @@ pub(super) struct Scan {
     pub most_likely: MostLikely,
     /// Covariance of what the motions may have smoothed at each stone, world, m^2.
     pub smoothed: Vec<Matrix3<f64>>,
-    /// Standard deviations that the most likely bulge of a still wall exceeds in 5 of 100 cases.
+    /// 95 % quantile of the standardised score of the most likely bulge of a still wall, no stone left out.
     pub reach: f64,
     /// See [`super::found::Deformation::detection_limits_m`].
     pub detection_limits_m: [Option<f64>; 3],
@@ -54,10 +59,11 @@ pub(super) fn scan(body: &Body) -> Option<Scan> {
     let model = Model::new(body, &firm)?;
     let bulges = bulges(body, &firm, &model);
     let observed: Vec<Vector3<f64>> = body.stones.iter().map(|s| s.vector).collect();
-    let (largest, place) = model.largest(&bulges, &observed)?;
     let beyond = |s: &BodyStone| s.vector - s.information * s.displacement;
     let beyond: Vec<Vector3<f64>> = body.stones.iter().map(beyond).collect();
     let left_over = [observed, beyond].map(|vectors| model.left_over(&vectors));
+    let sizes = bulges.iter().map(|b| b.largest(&left_over[0]).without_largest);
+    let (largest, place) = sizes.zip(0..).max_by(|a, b| a.0.total_cmp(&b.0))?;
     let most_likely = bulges[place].most_likely(&left_over)?;
     let roots: Vec<Matrix3<f64>> = body.stones.iter().map(|s| root(&s.information)).collect();
 
@@ -69,44 +75,46 @@ pub(super) fn scan(body: &Body) -> Option<Scan> {
             stone.information * body.shared.at::<1>(i, &u) + roots[i] * noise
         };
         let vectors: Vec<Vector3<f64>> = body.stones.iter().enumerate().map(of_stone).collect();
-        model.largest(&bulges, &vectors).map_or(0.0, |(z, _)| z)
+        let rest = model.left_over(&vectors);
+        bulges
+            .iter()
+            .map(|b| b.largest(&rest))
+            .fold(Score::default(), Score::larger)
     };
 
-    let mut still: Vec<f64> = (0..SIMULATIONS).into_par_iter().map(simulate).collect();
-    still.sort_by(f64::total_cmp);
+    let of_still: Vec<Score> = (0..SIMULATIONS).into_par_iter().map(simulate).collect();
+    let ascending = |of: fn(&Score) -> f64| {
+        let mut sizes: Vec<f64> = of_still.iter().map(of).collect();
+        sizes.sort_by(f64::total_cmp);
+        sizes
+    };
+    let still = ascending(|s| s.without_largest);
+    let of_most_likely = ascending(|s| s.whole);
     let above = still.iter().filter(|z| **z >= largest).count();
     let simulated = (1 + above) as f64 / (SIMULATIONS + 1) as f64;
 
     // Beyond what simulations resolve: the sum of the probabilities of all bulges (Bonferroni).
     let tested: usize = bulges.iter().map(|b| b.directions.iter().flatten().count()).sum();
     let sum = 2.0 * tested as f64 * Normal::standard().sf(largest);
-    let exceeded_in = |share: f64| still[((1.0 - share) * SIMULATIONS as f64) as usize];
-    let limit = exceeded_in(LEVEL);
-    let limits_m = |directions: &[usize]| {
-        ZONE_EXTENTS_M.map(|extent_m| detection_limit_m(&bulges, extent_m, directions, limit))
+    let exceeded_in = |sizes: &[f64], share: f64| sizes[((1.0 - share) * SIMULATIONS as f64) as usize];
+    let limit = exceeded_in(&still, LEVEL);
+    let limits_m = ZONE_EXTENTS_M.map(|extent_m| model.detection_limits_m(&bulges, extent_m, limit));
+    let median = |limits_m: &[[Option<f64>; 3]], directions: &[usize]| {
+        let worst = |limits: &[Option<f64>; 3]| {
+            let limits: Option<Vec<f64>> = directions.iter().map(|&k| limits[k]).collect();
+            limits?.into_iter().reduce(f64::max)
+        };
+        upper_median(&mut limits_m.iter().filter_map(worst).collect::<Vec<f64>>())
     };
 
     Some(Scan {
         p: simulated.min(sum),
         most_likely,
         smoothed: smoothed(body, &bulges, &left_over[1]),
-        reach: exceeded_in(OUTSIDE),
-        detection_limits_m: limits_m(&[OUT]),
-        limits_in_face_m: limits_m(&IN_FACE),
+        reach: exceeded_in(&of_most_likely, OUTSIDE),
+        detection_limits_m: limits_m.each_ref().map(|limits| median(limits, &[OUT])),
+        limits_in_face_m: limits_m.each_ref().map(|limits| median(limits, &IN_FACE)),
     })
-}
-
-/// The smallest bulge of this diameter that is found in 95 of 100 cases, in the median over the wall, in the direction of
-/// these in which it must be largest.
-fn detection_limit_m(bulges: &[Bulge], extent_m: f64, directions: &[usize], limit: f64) -> Option<f64> {
-    let of_bulge = |bulge: &Bulge| {
-        let in_direction = |&k: &usize| Some(bulge.directions[k]?.amplitude_sd_m());
-        let sds: Option<Vec<f64>> = directions.iter().map(in_direction).collect();
-        Some((limit + POWER) * sds?.into_iter().fold(0.0, f64::max))
-    };
-    let of_extent = bulges.iter().filter(|b| b.diameter_m == extent_m);
-    let mut limits: Vec<f64> = of_extent.filter_map(of_bulge).collect();
-    upper_median(&mut limits)
 }
 
 /// The rigid motion that all stones but loose ones share, by least squares.
@@ -138,13 +146,6 @@ impl<'a> Model<'a> {
             of_shared,
             weights: (0..body.stones.len()).map(|i| weight(body, i)).collect(),
         })
-    }
-
-    /// The largest standardised score, and the number of its bulge. `vectors`: of all stones' observations.
-    fn largest(&self, bulges: &[Bulge], vectors: &[Vector3<f64>]) -> Option<(f64, usize)> {
-        let rest = self.left_over(vectors);
-        let scores = bulges.iter().map(|b| b.largest(&rest)).zip(0..);
-        scores.max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     /// What the rigid motion leaves over of each stone, in its frame and up to the limit; the motion is found with what
@@ -201,8 +202,54 @@ impl<'a> Model<'a> {
             (left > LEAST_SHARE * plain[(k, k)] && variance > 0.0).then(|| Direction {
                 score_sd: variance.sqrt(),
                 information: left,
+                with_rigid: with_rigid.column(k).into_owned(),
             })
         })
+    }
+
+    /// The smallest amplitude of each bulge of this diameter, in each direction, that is found in 95 of 100 cases if scores
+    /// above `limit` are significant. It is the smallest over the nearest bulge of each diameter, its own included:
+    /// without its largest stone, a bulge can be easier to detect in the score of another one.
+    fn detection_limits_m(&self, bulges: &[Bulge], extent_m: f64, limit: f64) -> Vec<[Option<f64>; 3]> {
+        let of_size: Vec<&[Bulge]> = bulges.chunk_by(|a, b| a.diameter_m == b.diameter_m).collect();
+        let of_bulge = |bulge: &Bulge| {
+            let distance = |other: &Bulge| (other.middle - bulge.middle).norm();
+            let nearest = of_size.iter().filter_map(|same| {
+                let by_distance = |a: &&Bulge, b: &&Bulge| distance(a).total_cmp(&distance(b));
+                same.iter().min_by(by_distance)
+            });
+            let beside: Vec<&Bulge> = nearest.collect();
+            std::array::from_fn(|k| {
+                let limits = beside
+                    .iter()
+                    .filter_map(|scored| self.found_from_m(bulge, scored, k, limit));
+                limits.reduce(f64::min)
+            })
+        };
+        let of_extent = bulges.par_iter().filter(|b| b.diameter_m == extent_m);
+        of_extent.map(of_bulge).collect()
+    }
+
+    /// The amplitude of `moved` that raises the score of `scored`, without its largest stone, above `limit` in 95 of 100
+    /// cases; `None` where no amplitude does.
+    fn found_from_m(&self, moved: &Bulge, scored: &Bulge, direction: usize, limit: f64) -> Option<f64> {
+        let (by_moved, by_scored) = (moved.directions[direction]?, scored.directions[direction]?);
+        let (mut sum, mut largest, mut variance) = (0.0, 0.0, 0.0);
+        for (i, share) in &moved.stones {
+            let stone = &self.body.stones[*i];
+            let axis = stone.joint.face_from_world.row(direction).transpose();
+            let information = axis.dot(&(stone.information * axis));
+            let of_scored = bulges::share((stone.joint.place - scored.middle).norm(), scored.diameter_m);
+            let added = share * of_scored * information;
+            sum += added;
+            if added > largest {
+                (largest, variance) = (added, of_scored * of_scored * information);
+            }
+        }
+        let of_one_metre = sum - by_scored.with_rigid.dot(&(self.inverse * by_moved.with_rigid)) - largest;
+        // The errors of the stone that is left out do not count either.
+        let sd = (by_scored.score_sd.powi(2) - variance).max(0.0).sqrt();
+        (of_one_metre > 0.0).then(|| (limit * by_scored.score_sd + POWER * sd) / of_one_metre)
     }
 }
 
@@ -217,6 +264,7 @@ fn weight(body: &Body, stone: usize) -> Matrix3<f64> {
 /// All bulges of a body.
 fn bulges(body: &Body, firm: &[usize], model: &Model) -> Vec<Bulge> {
     let bulge = |shape: Shape| Bulge {
+        middle: shape.middle,
         directions: model.directions(&shape.stones),
         diameter_m: shape.diameter_m,
         stones: shape.stones,

@@ -28,8 +28,9 @@ const LEVEL: f64 = 0.7;
 /// The zones of a body that deformed; their numbers are left open.
 ///
 /// Stones are tested one by one with the false discovery rate controlled over the body (Benjamini & Hochberg 1995; tests
-/// of stones that share errors are positively dependent). Where no three connected stones stand out, the zone is the most
-/// likely bulge, as large as the stones' own observations say: the field smooths what it shows no more clearly.
+/// of stones that share errors are positively dependent). Fewer than three connected stones, or stones whose interval
+/// begins at zero, are no zone. If none is left, the zone is the most likely bulge, with the amplitude that the stones'
+/// own observations give it, as the field smooths weak motions.
 pub(super) fn zones(body: &Body, rigid: &RigidPart, scan: &Scan) -> Vec<DeformationZone> {
     let law = ChiSquared::new(3.0).ok();
     let p = |(i, square): (usize, &f64)| {
@@ -45,13 +46,15 @@ pub(super) fn zones(body: &Body, rigid: &RigidPart, scan: &Scan) -> Vec<Deformat
             next[*high].push(*low);
         }
     }
-    let parts: Vec<Vec<usize>> = components(&next)
-        .into_iter()
-        .filter(|part| part.len() >= LEAST_STONES)
-        .collect();
-    match parts.is_empty() {
+    let parts = components(&next);
+    let of_part = |stones: &Vec<usize>| {
+        let zone = (stones.len() >= LEAST_STONES).then(|| zone(body, rigid, stones))?;
+        (zone.interval_m[0] > 0.0).then_some(zone)
+    };
+    let found: Vec<DeformationZone> = parts.iter().filter_map(of_part).collect();
+    match found.is_empty() {
         true => vec![bulge(body, scan)],
-        false => parts.iter().map(|stones| zone(body, rigid, stones)).collect(),
+        false => found,
     }
 }
 

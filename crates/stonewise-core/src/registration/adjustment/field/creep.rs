@@ -9,13 +9,16 @@ use super::graph::Node;
 use super::prior::Least;
 use super::problem::FieldProblem;
 use super::subgraph::Subgraph;
-use crate::registration::bulges::{LARGEST_RESIDUAL, OUT, Shape, shapes};
+use crate::registration::bulges::{OUT, Shape, shapes};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Probability of a zone, anywhere, in a wall that moves as its field says.
 const FALSE_ALARM: f64 = 0.2;
+/// Standard deviations up to which the residual of a stone counts: one stone in a hundred has more by chance (chi-square,
+/// three degrees of freedom; Huber 1964), so that no single stone makes a zone.
+const LARGEST_RESIDUAL: f64 = 3.368;
 /// Deviance that a drift and a strain of its own must gain: odds of 150 to 1.
 const LEAST_GAIN: f64 = 10.0;
 /// Drifts per square root metre and strains that are tried, up to their bounds.
