@@ -2,13 +2,12 @@
 #![allow(clippy::unwrap_used)]
 
 use safetensors::SafeTensors;
-use std::time::Instant;
 use stonewise_core::raster::{LabelImage, Raster, ReliefMap, RgbImage};
+use stonewise_segment::Sample;
 use stonewise_segment::model::{
     MaskRcnn, MaskRcnnConfig, Precision, WeightsError, config_from_bytes, model_from_bytes, weights_to_bytes,
 };
 use stonewise_segment::train::{AdamW, AdamWParams};
-use stonewise_segment::{Sample, Weights, open_model};
 
 /// A stone on a wall, and relief of another size, neither that of the photo nor half of it.
 fn sample() -> Sample {
@@ -91,33 +90,4 @@ fn a_file_of_colour_alone_can_learn_relief() {
         matches!(&error, WeightsError::Missing { key, .. } if key == lost),
         "{error}"
     );
-}
-
-/// `LITE_WEIGHTS=FILE cargo test ... -- --ignored --nocapture`
-#[test]
-#[ignore = "prints how long a file's detector takes"]
-fn time_of_a_tile() {
-    let path = std::env::var_os("LITE_WEIGHTS").unwrap();
-    let noise = |i: u32| [(60 + (i % 640 / 23 * 7 + i / 640 / 17 * 13) * 37 % 160) as u8; 3];
-    let image: RgbImage = Raster::from_vec(640, 640, (0..640 * 640).map(noise).collect()).unwrap();
-    let relief: ReliefMap = Raster::filled(320, 320, [0.1, 0.0, 0.0, 1.0]);
-    for (name, weights) in [
-        ("file", Weights::File(path.into())),
-        ("built-in", Weights::BuiltIn),
-    ] {
-        let model = open_model(&weights, true).unwrap().for_inference();
-        for relief in [None, Some(&relief)] {
-            for _ in 0..3 {
-                let start = Instant::now();
-                let found = model.instances(&image, relief);
-                let seconds = start.elapsed().as_secs_f64();
-                let best = found.first().map(|best| (best.score, best.bounds));
-                println!(
-                    "{name}, relief {}: {seconds:.2} s, {} found, {best:?}",
-                    relief.is_some(),
-                    found.len()
-                );
-            }
-        }
-    }
 }
