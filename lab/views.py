@@ -47,7 +47,7 @@ def holes(share):
 
 
 def measured(survey, folder, binary):
-    """The stones of a wall, with size in distances and whether they are measured, and the rows beside."""
+    """The stones of a wall (size in distances, whether measured), the rows beside, the distance."""
     folder.mkdir(parents=True)
     (folder / "parameters.toml").write_text(survey.parameters())
     simulated = folder / "simulated"
