@@ -602,6 +602,14 @@ def parse():
 def measure(survey, folder, binary):
     """The figures of a survey by column."""
     shutil.rmtree(folder, ignore_errors=True)
+    scene, motions, said = run(survey, folder, binary)
+    if not (folder / "results/verdict.json").exists():
+        raise RunError(said)
+    return compare(scene, motions, folder / "results")
+
+
+def run(survey, folder, binary):
+    """Runs a survey in a new folder: scene, true motions of the points, last line of the run."""
     folder.mkdir(parents=True)
     (folder / "parameters.toml").write_text(survey.parameters())
     parameters, simulated = folder / "parameters.toml", folder / "simulated"
@@ -612,9 +620,7 @@ def measure(survey, folder, binary):
     motions = scene.true_motions()
     write(survey, scene, folder)
     said = call(binary, "run", folder / "project.toml", "--out", folder / "results", may_fail=True)
-    if not (folder / "results/verdict.json").exists():
-        raise RunError(said)
-    return compare(scene, motions, folder / "results")
+    return scene, motions, said
 
 
 def call(*command, may_fail=False):
@@ -665,9 +671,7 @@ def compare(scene, motions, results):
     """The figures of a run against the true motions of the first cloud's points."""
     verdict = json.loads((results / "verdict.json").read_text())
     epoch = verdict["epochs"][0]
-    [labelled] = (results / "epoch1").glob("*.laz")
-    found = np.array(laspy.read(labelled).stone_id).astype(int)
-    stones = with_truth(pd.read_csv(results / "stones.csv"), found, scene.clouds[0].stone, motions)
+    stones = with_truth(scene, motions, results)
     measured = stones[stones["status"] == "ok"].copy()
     true_loose = {*scene.stones.index[scene.stones["loose"] == 1], *scene.lost}
     measured["free"] = measured["own"].isin(true_loose) | (measured["loose"] == 1)
@@ -687,11 +691,11 @@ def compare(scene, motions, results):
     }
 
 
-def with_truth(stones, found, true, motions):
-    """Stones with what their points show: the true stone of most of them, and its motion there.
-
-    `found` and `true` are the stones of the points, as labelled by the run and by the simulator.
-    """
+def with_truth(scene, motions, results):
+    """The stones of a run, each with the true stone of most of its points and the motion there."""
+    [labelled] = (results / "epoch1").glob("*.laz")
+    found = np.array(laspy.read(labelled).stone_id).astype(int)
+    stones, true = pd.read_csv(results / "stones.csv"), scene.clouds[0].stone
     points = pd.DataFrame(motions, columns=[f"true_{axis}" for axis in XYZ])
     points = points.assign(stone_id=found, own=true, on_wall=true > 0)[found > 0]
     share = points.groupby("stone_id")["on_wall"].mean()

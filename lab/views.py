@@ -18,8 +18,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-import panel
-from panel import BARE, Survey, call, pd, np, read, write
+from panel import BARE, ROOT, XYZ, RunError, Survey, millimetres, np, pd, run, with_truth
 
 RELIEF = '[views]\nshow = "relief"\n'
 LEAST_VISIBLE = 0.5
@@ -48,27 +47,15 @@ def holes(share):
 
 def measured(survey, folder, binary):
     """The stones of a wall (size in distances, whether measured), the rows beside, the distance."""
-    folder.mkdir(parents=True)
-    (folder / "parameters.toml").write_text(survey.parameters())
-    simulated = folder / "simulated"
-    call(binary, "simulate", "--quiet", "--params", folder / "parameters.toml", "--out", simulated)
-    scene = read(survey, simulated)
+    scene, motions, said = run(survey, folder, binary)
+    if not (folder / "results/stones.csv").exists():
+        raise RunError(said)
     whole = scene.stones[scene.stones["visible"] >= LEAST_VISIBLE]
     distance_m = np.sqrt((whole["area_m2"] * whole["visible"]).sum() / whole["points"].sum())
-    for edit in survey.edits:
-        edit(scene)
-    motions = scene.true_motions()
-    write(survey, scene, folder)
-    said = call(binary, "run", folder / "project.toml", "--out", folder / "results", may_fail=True)
-    if not (folder / "results/stones.csv").exists():
-        raise panel.RunError(said)
-    [labelled] = (folder / "results/epoch1").glob("*.laz")
-    found = np.array(panel.laspy.read(labelled).stone_id).astype(int)
-    rows = pd.read_csv(folder / "results/stones.csv")
-    rows = panel.with_truth(rows, found, scene.clouds[0].stone, motions)
+    rows = with_truth(scene, motions, folder / "results")
     rows = rows[rows["status"] == "ok"]
     middles = scene.stones[["cx", "cy", "cz"]].to_numpy()
-    apart = np.linalg.norm(rows[panel.XYZ].to_numpy()[:, None] - middles[None], axis=2)
+    apart = np.linalg.norm(rows[XYZ].to_numpy()[:, None] - middles[None], axis=2)
     countable = whole[whole["edge"] == 0]
     return (
         pd.DataFrame(
@@ -97,7 +84,7 @@ def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--binary", type=Path, default=panel.ROOT / "target/release/stonewise")
+    parser.add_argument("--binary", type=Path, default=ROOT / "target/release/stonewise")
     parser.add_argument("--out", help="a new folder; a temporary one when absent")
     arguments = parser.parse_args()
     out = Path(arguments.out or tempfile.mkdtemp(prefix="stonewise-views-"))
@@ -110,7 +97,7 @@ def main():
         survey = wall(name, 11, noise=noise_m, edits=edits)
         stones, beside, _ = measured(survey, out / name, arguments.binary)
         count = f"{stones['measured'].sum()} of {len(stones)}"
-        row(panel.millimetres(noise_m), f"{100 * share:.0f} %", count, beside)
+        row(millimetres(noise_m), f"{100 * share:.0f} %", count, beside)
 
     print()
     every = []
