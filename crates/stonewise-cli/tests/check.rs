@@ -11,7 +11,7 @@ use stonewise_core::raster::{LabelImage, Raster};
 use stonewise_io::cloud::{CloudError, read_cloud, write_coloured_laz, write_points_laz};
 use stonewise_io::image_io::{read_rgb, write_jpeg};
 use stonewise_io::masks::write_label_png;
-use support::{copy_of, outcome, run, sharp_survey, stonewise, tiny_survey};
+use support::{copy_of, outcome, run, sharp_survey, stonewise, survey, tiny_survey};
 
 /// Runs `check`; exit code, table, log.
 fn check(survey: &Path) -> (i32, String, String) {
@@ -416,7 +416,7 @@ fn masks_that_a_run_cannot_use_are_found() {
 
 #[test]
 fn a_doubtful_survey_runs_with_exit_code_3_and_says_so_first() {
-    let survey = copy_of(sharp_survey());
+    let survey = copy_of(survey());
     fs::write(first_photo(survey.path()), "").unwrap();
     let out = survey.path().join("out");
     let (code, log) = run(survey.path(), &out, &["--quiet"]);
@@ -433,7 +433,7 @@ fn a_doubtful_survey_runs_with_exit_code_3_and_says_so_first() {
 
 #[test]
 fn clouds_far_off_their_photos_end_in_exit_code_3_even_by_force() {
-    let survey = copy_of(sharp_survey());
+    let survey = copy_of(survey());
     map_cloud(&survey.path().join(CLOUD_2), |p| {
         p + nalgebra::Vector3::new(0.0, 0.12, 0.0)
     });

@@ -264,7 +264,7 @@ fn sensitivity_draws_a_curve_for_each_scanner() {
     let dir = tempfile::tempdir().unwrap();
     let options = SensitivityOptions {
         influences: vec![Influence::Overlap],
-        size_m: [1.5, 1.0],
+        size_m: [1.0, 0.8],
         seeds: 1,
         with_paper: false,
     };

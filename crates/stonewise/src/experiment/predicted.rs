@@ -1,6 +1,8 @@
 //! Figures of predictions, in millimetres.
 
-use stonewise_core::registration::Deformation;
+use crate::results::{StoneOutline, StoneRow};
+use std::collections::BTreeMap;
+use stonewise_core::registration::{Deformation, StoneDeformation};
 use stonewise_core::statistics::median;
 
 /// Median over the items along, up and out, of those that have a value. `of`: an item's value along an axis, metres.
@@ -18,6 +20,32 @@ pub(super) fn limits_mm(
 ) -> [Option<f64>; 3] {
     let limits_m = judged.map_or([None; 3], limits_m);
     limits_m.map(|limit| limit.map(|m| 1e3 * m))
+}
+
+/// The rows with the standard deviations of deformations as they are where nothing shows a zone: what the noise of a single
+/// draw shows by chance of one, and what is added to their variances for it, are no part of a prediction.
+pub(super) fn without_chance(
+    rows: &[StoneRow],
+    judged: Option<&Deformation>,
+    outlines: &BTreeMap<u32, StoneOutline>,
+) -> Vec<StoneRow> {
+    let stones: BTreeMap<u32, &StoneDeformation> = { judged.into_iter() }
+        .flat_map(|d| d.stones.iter().map(|s| (s.stone.0, s)))
+        .collect();
+    let predicted = |row: &StoneRow| {
+        let drawn = stones.get(&row.stone_id).zip(outlines.get(&row.stone_id));
+        drawn.map_or_else(
+            || row.clone(),
+            |(drawn, outline)| {
+                let still = StoneDeformation {
+                    covariance: drawn.covariance - drawn.smoothed,
+                    ..**drawn
+                };
+                row.clone().with_deformation(&outline.normal, &still)
+            },
+        )
+    };
+    rows.iter().map(predicted).collect()
 }
 
 /// A figure in a table; a dash where there is none.

@@ -12,7 +12,7 @@ mod table;
 use crate::error::{Error, Result};
 use crate::experiment::baseline::{InventoryStone, baseline};
 use crate::experiment::halves::halves_of;
-use crate::experiment::predicted::{limits_mm, medians_mm};
+use crate::experiment::predicted::{limits_mm, medians_mm, without_chance};
 use crate::experiment::quiet::Quiet;
 use crate::files::{write_readable_json, write_text};
 use crate::pipeline::{Context, Run, Until};
@@ -102,7 +102,8 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
         expect(all, registration, shared, sources, motion.deformation_sd)
     };
 
-    let repeated: Vec<(&StoneRow, Option<Expected>)> = { measured.rows.iter() }
+    let rows = without_chance(&measured.rows, registered.deformation.as_ref(), &outlines);
+    let repeated: Vec<(&StoneRow, Option<Expected>)> = { rows.iter() }
         .map(|row| (row, row.motion.as_ref().map(|motion| expected(row, motion))))
         .collect();
     let all = foreseen(inventory, repeated);

@@ -10,12 +10,12 @@ mod planned;
 mod squares;
 
 use crate::error::{Error, Result};
-use crate::experiment::predicted::{limits_mm, medians_mm};
+use crate::experiment::predicted::{limits_mm, medians_mm, without_chance};
 use crate::experiment::quiet::Quiet;
 use crate::files::{write_readable_json, write_text};
 use crate::pipeline::{Context, Run, Until};
 use crate::project::Project;
-use crate::results::{RowMotion, StoneRow};
+use crate::results::{RowMotion, StoneRow, read_outlines};
 use crate::storage::step::Key;
 use crate::storage::store::{Keeps, StepStore};
 use page::page;
@@ -96,10 +96,13 @@ fn survey(
     let mut project = Project::read(&dir.file("survey").join("stonewise.toml"))?;
     // The photos show nothing but where stones are.
     project.settings.registration.photos.enabled = false;
-    let context = Context::with_store(&project, &out.join(&name), Arc::clone(store), &quiet)?;
+    let folder = out.join(&name);
+    let context = Context::with_store(&project, &folder, Arc::clone(store), &quiet)?;
     let (run, later) = (Run::new(&context, Until::Registered), EpochId::at(1));
     let (registered, measured) = (run.registered(later)?, run.measured(later)?);
-    let found: Vec<(&StoneRow, &RowMotion)> = { measured.rows.iter() }
+    let deformation = registered.deformation.as_ref();
+    let rows = without_chance(&measured.rows, deformation, &read_outlines(&folder)?);
+    let found: Vec<(&StoneRow, &RowMotion)> = { rows.iter() }
         .filter_map(|row| Some((row, row.motion.as_ref()?)))
         .collect();
     if found.is_empty() {
@@ -109,7 +112,6 @@ fn survey(
     }
 
     let squares = Squares::new(wall, plan.square_m, &found);
-    let deformation = registered.deformation.as_ref();
     let summary = PlannedSurvey {
         stations: stations(plan, added).map(|s| s.name.clone()).collect(),
         added: added.map(|s| s.name.clone()),
