@@ -22,14 +22,14 @@ pub(super) fn limits_mm(
     limits_m.map(|limit| limit.map(|m| 1e3 * m))
 }
 
-/// The rows with the standard deviations of deformations as they are where nothing shows a zone: what the noise of a single
-/// draw shows by chance of one, and what is added to their variances for it, are no part of a prediction.
+/// The rows with the standard deviations of deformations as they are where no deformation is shown: where the noise of a
+/// single draw shows one by chance, what is added to their variances for it is no part of a prediction.
 pub(super) fn without_chance(
     rows: &[StoneRow],
     judged: Option<&Deformation>,
     outlines: &BTreeMap<u32, StoneOutline>,
 ) -> Vec<StoneRow> {
-    let stones: BTreeMap<u32, &StoneDeformation> = { judged.into_iter() }
+    let stones: BTreeMap<u32, &StoneDeformation> = { judged.filter(|d| d.is_shown()).into_iter() }
         .flat_map(|d| d.stones.iter().map(|s| (s.stone.0, s)))
         .collect();
     let predicted = |row: &StoneRow| {
