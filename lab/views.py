@@ -89,7 +89,7 @@ def main():
     arguments = parser.parse_args()
     out = Path(arguments.out or tempfile.mkdtemp(prefix="stonewise-views-"))
 
-    row("range noise mm", "points taken out", "measured", "rows beside a stone")
+    row("range noise mm", "points removed", "measured", "rows beside a stone")
     row("---", "---", "---", "---")
     for noise_m, share in DISTURBED:
         name = f"noise_{noise_m}_holes_{share}"
@@ -116,7 +116,7 @@ def main():
     stones = pd.concat(every)
     low = [0, *SIZES[:-1]]
     between = (f"{a} to {b}" for a, b in zip(SIZES, SIZES[1:-1]))
-    row("distances across the stone", f"under {SIZES[0]}", *between, "above")
+    row("point spacings across the stone", f"under {SIZES[0]}", *between, "above")
     row(*["---"] * (len(SIZES) + 1))
     classes = (stones[(stones["size"] >= a) & (stones["size"] < b)] for a, b in zip(low, SIZES))
     row("measured", *(f"{c['measured'].sum()} of {len(c)}" for c in classes))
