@@ -1,6 +1,7 @@
 //! Figures of predictions, in millimetres.
 
 use crate::results::{StoneOutline, StoneRow};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use stonewise_core::registration::{Deformation, StoneDeformation};
 use stonewise_core::statistics::median;
@@ -24,26 +25,25 @@ pub(super) fn limits_mm(
 
 /// The rows with the standard deviations of deformations as they are where no deformation is shown: where the noise of a
 /// single draw shows one by chance, what is added to their variances for it is no part of a prediction.
-pub(super) fn without_chance(
-    rows: &[StoneRow],
+pub(super) fn without_chance<'a>(
+    rows: &'a [StoneRow],
     judged: Option<&Deformation>,
     outlines: &BTreeMap<u32, StoneOutline>,
-) -> Vec<StoneRow> {
-    let stones: BTreeMap<u32, &StoneDeformation> = { judged.filter(|d| d.is_shown()).into_iter() }
-        .flat_map(|d| d.stones.iter().map(|s| (s.stone.0, s)))
-        .collect();
+) -> Cow<'a, [StoneRow]> {
+    let Some(shown) = judged.filter(|d| d.is_shown()) else {
+        return rows.into();
+    };
+    let stones: BTreeMap<u32, &StoneDeformation> = shown.stones.iter().map(|s| (s.stone.0, s)).collect();
     let predicted = |row: &StoneRow| {
-        let drawn = stones.get(&row.stone_id).zip(outlines.get(&row.stone_id));
-        drawn.map_or_else(
-            || row.clone(),
-            |(drawn, outline)| {
-                let still = StoneDeformation {
-                    covariance: drawn.covariance - drawn.smoothed,
-                    ..**drawn
-                };
-                row.clone().with_deformation(&outline.normal, &still)
-            },
-        )
+        let row = row.clone();
+        let Some((drawn, outline)) = stones.get(&row.stone_id).zip(outlines.get(&row.stone_id)) else {
+            return row;
+        };
+        let still = StoneDeformation {
+            covariance: drawn.covariance_without_zones(),
+            ..**drawn
+        };
+        row.with_deformation(&outline.normal, &still)
     };
     rows.iter().map(predicted).collect()
 }

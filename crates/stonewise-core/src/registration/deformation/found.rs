@@ -52,6 +52,13 @@ pub struct StoneDeformation {
     pub zone: u32,
 }
 
+impl StoneDeformation {
+    /// Its covariance without the part for smoothed zones, m^2.
+    pub fn covariance_without_zones(&self) -> Matrix3<f64> {
+        self.covariance - self.smoothed
+    }
+}
+
 /// A zone that deformed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DeformationZone {

@@ -151,7 +151,7 @@ fn series(run: &Run, order: &[EpochId], stones: &[Stone], tracked: &Tracked) -> 
         for found in registered.deformation.iter().flat_map(|d| &d.stones) {
             let row = rows.get(&found.stone.0).filter(|row| row.motion.is_some());
             if let (Some(&i), Some(row)) = (place_of.get(&found.stone), row) {
-                places[i].deformations[time] = Some((found.deformation, found.covariance - found.smoothed));
+                places[i].deformations[time] = Some((found.deformation, found.covariance_without_zones()));
                 if let Some(years) = years_apart(run.context.project, *id) {
                     let face = FaceFrame::from_normal(&stones[i].normal).face_from_world();
                     let own = (face * found.smoothed * face.transpose()).diagonal();
