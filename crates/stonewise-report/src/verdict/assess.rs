@@ -94,7 +94,7 @@ fn judge_stone(case: &Case, stone: &StoneCase, q: Option<f64>, thresholds: &Thre
     };
 
     if let Some(measured) = &stone.measured {
-        let moved = q.is_some_and(|q| q <= FALSE_DISCOVERY_RATE);
+        let moved = q.is_some_and(|q| q <= FALSE_DISCOVERY_RATE) && case.may_have_moved(measured);
         let (length, neighbours) = (
             measured.motion.length_interval(),
             measured.neighbours.length_interval(),

@@ -46,6 +46,8 @@ pub(crate) struct StoneMeasured {
     pub neighbours: Estimate,
     pub above_limit: bool,
     pub loose: bool,
+    /// Its part of the wall was tested for a change of its shape.
+    pub shape_tested: bool,
     pub detection_limit_m: f64,
 }
 
@@ -63,6 +65,13 @@ impl Case {
     /// Whether the results can be relied on as a whole.
     pub(super) fn is_sound(&self) -> bool {
         !self.not_converged && !self.in_doubt
+    }
+
+    /// Whether this can be a motion of the stone. Where the registration error is unknown, a motion against the common
+    /// one is a change of the wall's shape or that of a loose stone.
+    pub(super) fn may_have_moved(&self, stone: &StoneMeasured) -> bool {
+        let shape_changed = self.deformation.as_ref().is_some_and(|found| found.shown);
+        self.has_datum() || shape_changed || stone.loose || !stone.shape_tested
     }
 
     /// Whether intervals hold the registration error, so that they say something about the wall as a whole.

@@ -40,6 +40,7 @@ fn stone(stone_id: u32, place: [f64; 2], moved: Vector3<f64>, normal: &mut Norma
             neighbours: Estimate { vector, covariance },
             above_limit: vector.norm() > detection_limit_m,
             loose: false,
+            shape_tested: false,
             detection_limit_m,
         }),
     }
@@ -200,6 +201,32 @@ fn without_a_datum_nothing_is_fine_but_a_motion_against_the_rest_is_an_alarm() {
             "{}",
             verdict.sentence
         );
+    }
+}
+
+#[test]
+fn without_a_datum_a_stone_moved_only_if_it_is_loose_or_the_wall_changed_its_shape() {
+    for (shape_tested, is_loose, is_bulged, moved) in [
+        (false, false, false, true),
+        (true, false, false, false),
+        (true, true, false, true),
+        (true, false, true, true),
+    ] {
+        for datum in [DatumState::Unknown, DatumState::Stable] {
+            let mut case = wall(1, 0.02, 6);
+            case.datum = Some(datum);
+            case.deformation = bulged(is_bulged).deformation;
+            let measured = case.stones[0].measured.as_mut().unwrap();
+            (measured.shape_tested, measured.loose) = (shape_tested, is_loose);
+            let verdict = judge(&case, &usual());
+            let expected = moved || datum == DatumState::Stable;
+            assert_eq!(
+                verdict.stones[0].moved, expected,
+                "{shape_tested} {is_loose} {is_bulged}"
+            );
+            let state = if expected { State::Alarm } else { State::CannotTell };
+            assert_eq!(verdict.stones[0].state, state);
+        }
     }
 }
 
