@@ -33,7 +33,7 @@ const LEAST_OVERLAP: f64 = 0.5;
 const WIDEST_SPACING_M: f64 = 0.05;
 /// Distances between points across a stone (root of its area) from which on views show nearly all stones
 /// (docs/src/views.md).
-const FOUND_WELL: f64 = 25.0;
+const FOUND_WELL: f64 = 12.0;
 
 pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding> {
     let mut found = Vec::new();

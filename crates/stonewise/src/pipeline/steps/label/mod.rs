@@ -246,7 +246,7 @@ pub(super) fn tabulate(run: &Run, epoch: EpochId, name: &str, labels: Labels) ->
         let why = match context.project.part {
             Some(_) => "are there stones in the part of the wall that the run is limited to?",
             None if is_of_views => {
-                "the views of its cloud show none: the wall is smooth, or its points lie too far apart (25 distances \
+                "the views of its cloud show none: the wall is smooth, or its points lie too far apart (12 distances \
                  between points across a stone are needed); give posed photos"
             }
             None => "do its cameras and clouds share one frame?",
