@@ -1,0 +1,48 @@
+//! `certify`: the figures of one simulated wall and of a survey of the user's own.
+
+use crate::support::{stonewise, survey};
+use serde_json::Value;
+use std::fs;
+
+#[test]
+fn a_certificate_has_all_parts_and_goes_on_where_it_stopped() {
+    let dir = tempfile::tempdir().unwrap();
+    let certify = || {
+        let mut command = stonewise();
+        command.args(["certify", "--quiet", "--walls", "1", "--seed", "3", "--out"]);
+        let output = command
+            .arg(dir.path().join("certificate"))
+            .arg(survey().join("stonewise.toml"))
+            .output()
+            .unwrap();
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        let certificate = fs::read(dir.path().join("certificate/certificate.json")).unwrap_or_default();
+        assert!(!certificate.is_empty(), "{text}");
+        let certificate: Value = serde_json::from_slice(&certificate).unwrap();
+        (output.status.code().unwrap(), certificate)
+    };
+    let (code, certificate) = certify();
+    let figures = certificate["figures"].as_array().unwrap();
+    // What is outside is said, too.
+    assert_eq!(code, if certificate["holds"] == true { 0 } else { 3 });
+    let named = |words: &str| {
+        let of = figures
+            .iter()
+            .find(|f| f["name"].as_str().unwrap().contains(words));
+        assert!(of.is_some(), "no figure {words}");
+        of.unwrap()
+    };
+    for words in [
+        "Longley, as given",
+        "Wampler 5, about the middle",
+        "unmoved halves",
+    ] {
+        assert_eq!(named(words)["holds"], true, "{}", named(words));
+    }
+    assert!(named("Filip, as given")["value"].is_null());
+    assert!(named("translation of")["value"].as_f64().unwrap() > 0.9);
+    let (_, again) = certify();
+    assert_eq!(again["figures"], certificate["figures"]);
+    let page = fs::read_to_string(dir.path().join("certificate/certificate.html")).unwrap();
+    assert!(page.contains("Statistical Reference Datasets") && page.contains("own scans"));
+}

@@ -1,0 +1,576 @@
+//! Camera files of every format against pixels computed elsewhere, and back through the writers.
+
+use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use stonewise_core::geometry::{Camera, Distortion, NearPlane, Rigid3, View};
+use stonewise_core::id::ImageId;
+use stonewise_io::cameras::{
+    CameraError, CameraFile, MapFrame, Remark, find_photos, read_cameras, read_cameras_on_map, write_colmap,
+    write_metashape,
+};
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../testdata/cameras")
+        .join(name)
+}
+
+type Expected = BTreeMap<String, Vec<[f64; 5]>>;
+
+fn expected(section: &str) -> Expected {
+    let text = std::fs::read_to_string(fixture("expected.json")).unwrap();
+    let file: Value = serde_json::from_str(&text).unwrap();
+    serde_json::from_value(file[section].clone()).unwrap()
+}
+
+fn assert_pixels(file: &CameraFile, expected: &Expected) {
+    assert_eq!(file.views.len(), expected.len());
+    for (index, view) in file.views.iter().enumerate() {
+        assert_eq!(view.image, ImageId(index as u32));
+        let rows = &expected[&view.name];
+        assert_eq!(rows.len(), 20);
+        for [x, y, z, u, v] in rows {
+            let pixel = view.project(&Point3::new(*x, *y, *z)).unwrap().pixel;
+            let error = (pixel[0] - u).hypot(pixel[1] - v);
+            assert!(error < 1e-6, "{}: {error:e} px", view.name);
+        }
+    }
+}
+
+#[test]
+fn colmap_text_and_binary_put_points_where_opencv_does() {
+    for folder in [
+        "colmap_txt",
+        "colmap_bin",
+        "colmap_bin/images.bin",
+        "colmap_txt/cameras.txt",
+    ] {
+        let file = read_cameras(&fixture(folder)).unwrap();
+        assert_pixels(&file, &expected("colmap"));
+        assert_eq!(file.views[0].name, "flight 0/simple_pinhole.JPG");
+        assert!(file.skipped.is_empty() && file.warnings.is_empty());
+    }
+}
+
+#[test]
+fn metashape_puts_points_where_its_formulae_do() {
+    let file = read_cameras(&fixture("metashape.xml")).unwrap();
+    assert_pixels(&file, &expected("metashape"));
+    let names: Vec<&str> = file.views.iter().map(|v| v.name.as_str()).collect();
+    assert_eq!(names, ["DJI_0001", "DJI_0002.v2", "DJI_0003", "DJI & 4"]);
+    let skipped = [("unaligned", Remark::NotAligned), ("off", Remark::Disabled)];
+    let skipped = skipped.map(|(name, reason)| (name.to_owned(), reason));
+    assert_eq!(file.skipped, skipped);
+    assert_eq!(file.warnings, [Remark::ChunkDisabled("old try".to_owned())]);
+    assert!(file.crs.unwrap().starts_with("LOCAL_CS"));
+}
+
+#[test]
+fn metashape_says_that_a_shutter_is_rolling() {
+    let good = std::fs::read_to_string(fixture("metashape.xml")).unwrap();
+    let rows = "<rolling_shutter>1 0 0 0.002 0 1 0 0 0 0 1 0</rolling_shutter></camera>";
+    let dir = tempfile::tempdir().unwrap();
+    for (text, says) in [(good.clone(), false), (good.replacen("</camera>", rows, 1), true)] {
+        let path = dir.path().join("cameras.xml");
+        std::fs::write(&path, text).unwrap();
+        let file = read_cameras(&path).unwrap();
+        assert_eq!(file.rolling_shutter, says);
+        let warned = file.warnings.contains(&Remark::RollingShutter);
+        assert_eq!(warned, says, "{:?}", file.warnings);
+    }
+}
+
+#[test]
+fn opensfm_puts_points_where_opencv_does() {
+    let file = read_cameras(&fixture("opensfm.json")).unwrap();
+    assert_pixels(&file, &expected("opensfm"));
+    assert_eq!(file.skipped.len(), 1);
+    assert_eq!(file.skipped[0].0, "alone.jpg");
+    assert_eq!(file.warnings.len(), 1);
+}
+
+#[test]
+fn pix4d_and_nerfstudio_put_points_where_opencv_does() {
+    for (path, section) in [
+        ("pix4d/dam_calibrated_camera_parameters.txt", "pix4d"),
+        ("transforms.json", "nerfstudio"),
+    ] {
+        let file = read_cameras(&fixture(path)).unwrap();
+        assert_pixels(&file, &expected(section));
+        assert!(file.skipped.is_empty() && file.warnings.is_empty());
+    }
+}
+
+#[test]
+fn openmvg_puts_points_where_opencv_does() {
+    let file = read_cameras(&fixture("sfm_data.json")).unwrap();
+    assert_pixels(&file, &expected("openmvg"));
+    assert_eq!(file.skipped, [("lost.jpg".to_owned(), Remark::NotAligned)]);
+}
+
+/// A folder with photos of these sizes.
+fn photos(sizes: &[(&str, u32, u32)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, width, height) in sizes {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        image::GrayImage::new(*width, *height).save(path).unwrap();
+    }
+    folder
+}
+
+fn realitycapture_photos() -> tempfile::TempDir {
+    photos(&[
+        ("none.jpg", 400, 300),
+        ("wing/brown3, b.jpg", 300, 400),
+        ("brown3t2.jpg", 400, 300),
+        ("wing/brown4t2.jpg", 300, 400),
+    ])
+}
+
+#[test]
+fn realitycapture_puts_points_where_opencv_does() {
+    let photos = realitycapture_photos();
+    let expected = expected("realitycapture");
+    let read = |path: &str| {
+        let path = fixture("realitycapture").join(path);
+        read_cameras_on_map(&path, Some(photos.path()), &MapFrame::default()).unwrap()
+    };
+    for path in ["cameras.csv", "opencv.csv"] {
+        let file = read(path);
+        assert_pixels(&file, &expected);
+        assert!(file.skipped.is_empty() && file.warnings.is_empty());
+        assert_eq!(
+            find_photos(photos.path(), &file).unwrap().without_camera,
+            Vec::<PathBuf>::new()
+        );
+    }
+    let without_extension =
+        |(name, rows): (&String, &Vec<[f64; 5]>)| (name.replace(".jpg", ""), rows.clone());
+    let expected: Expected = expected.iter().map(without_extension).collect();
+    for path in ["xmp", "xmp/none.xmp"] {
+        let file = read(path);
+        assert_pixels(&file, &expected);
+        assert_eq!(
+            find_photos(photos.path(), &file).unwrap().without_camera,
+            Vec::<PathBuf>::new()
+        );
+    }
+}
+
+#[test]
+fn realitycapture_warns_of_yaw_on_a_map() {
+    let photos = realitycapture_photos();
+    let text = std::fs::read_to_string(fixture("realitycapture/cameras.csv")).unwrap();
+    let path = photos.path().join("cameras.csv");
+    std::fs::write(&path, text.replacen(".jpg,", ".jpg,4512", 1)).unwrap();
+    assert_eq!(read_cameras(&path).unwrap().warnings, [Remark::YawFromTrueNorth]);
+}
+
+#[test]
+fn bundler_agrees_with_the_colmap_model_that_it_was_made_from() {
+    let photos = photos(&[
+        ("photo_1.jpg", 400, 300),
+        ("photo_2.jpg", 300, 400),
+        ("photo_3.jpg", 400, 300),
+    ]);
+    let model = read_cameras(&fixture("bundler/colmap")).unwrap();
+    let path = fixture("bundler/dam.bundle.out");
+    let file = read_cameras_on_map(&path, Some(photos.path()), &MapFrame::default()).unwrap();
+    assert_eq!(file.views.len(), 3);
+    for (a, b) in model.views.iter().zip(&file.views) {
+        assert_eq!(a.name, b.name);
+        assert!((a.centre() - b.centre()).norm() < 1e-9);
+        for i in 0..100 {
+            let world = Point3::new(
+                f64::from(i % 5) - 2.0,
+                f64::from(i / 5 % 5) - 2.0,
+                f64::from(i / 25) - 2.0,
+            );
+            let (a, b) = (a.project(&world).unwrap().pixel, b.project(&world).unwrap().pixel);
+            assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-9, "{a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn bundler_leaves_out_photos_without_a_camera_and_reads_its_own_lists() {
+    let photos = photos(&[("photo_1.jpg", 400, 300), ("photo_3.jpg", 400, 300)]);
+    let text = std::fs::read_to_string(fixture("bundler/dam.bundle.out")).unwrap();
+    let path = photos.path().join("bundle.out");
+    let mut lines: Vec<&str> = text.lines().collect();
+    let nothing = ["0 0 0"; 5];
+    lines.splice(7..12, nothing);
+    std::fs::write(&path, lines.join("\n")).unwrap();
+    let list = "./photo_1.jpg\n./photo 2.jpg\n./photo_3.jpg 0 301.75\n";
+    std::fs::write(photos.path().join("list.txt"), list).unwrap();
+    let file = read_cameras(&path).unwrap();
+    let names: Vec<&str> = file.views.iter().map(|view| view.name.as_str()).collect();
+    assert_eq!(names, ["./photo_1.jpg", "./photo_3.jpg"]);
+    assert_eq!(file.skipped, [("./photo 2.jpg".to_owned(), Remark::NotAligned)]);
+    assert!(
+        find_photos(photos.path(), &file)
+            .unwrap()
+            .paths
+            .iter()
+            .all(Option::is_some)
+    );
+}
+
+#[test]
+fn cameras_without_sizes_that_cannot_be_read_say_why() {
+    let photos = realitycapture_photos();
+    let check = |source: &str, name: &str, from: &str, to: &str, part: &str| {
+        let path = photos.path().join(name);
+        let good = std::fs::read_to_string(fixture(source)).unwrap();
+        assert!(good.contains(from), "{from}");
+        std::fs::write(&path, good.replace(from, to)).unwrap();
+        let text = read_cameras(&path).unwrap_err().to_string();
+        assert!(text.contains(part) && text.contains(name), "{text}");
+        std::fs::remove_file(path).unwrap();
+    };
+    for (from, to, part) in [
+        (",pitch,", ",slope,", "column pitch is missing"),
+        (",f,", ",focus,", "a positive focal length"),
+        (",heading,", ",direction,", "column heading or yaw is missing"),
+        (
+            "26.280000000000001,",
+            "wide,",
+            "f is no number: \"wide\", at line 4",
+        ),
+        (
+            "26.280000000000001,",
+            "NaN,",
+            "f is no number: \"NaN\", at line 4",
+        ),
+        ("none.jpg,", "none.jpg", "expected 16 values, found 15, at line 3"),
+        (
+            ",0.083000000000000004,-0.017000000000000001,0,0,0\n",
+            ",0,0,0,0,0\n",
+            "model division (k1 alone) of photo wing/brown3, b.jpg",
+        ),
+        ("#name", "#image", "not a camera file"),
+        (".jpg", ".tif2", "none of them can be read"),
+    ] {
+        check("realitycapture/cameras.csv", "cameras.csv", from, to, part);
+    }
+    check(
+        "realitycapture/opencv.csv",
+        "opencv.csv",
+        ",ty,",
+        ",why,",
+        "column ty is missing",
+    );
+    check(
+        "realitycapture/opencv.csv",
+        "opencv.csv",
+        ",f_pix,",
+        ",focus,",
+        "a positive focal length",
+    );
+    for (from, to, part) in [
+        ("brown3t2\"", "division\"", "model division of photo brown3t2"),
+        (
+            "Skew=\"0\"",
+            "Skew=\"0.1\"",
+            "model K + brown3t2 of photo brown3t2",
+        ),
+        (
+            "xcr:FocalLength35mm",
+            "xcr:FocalLength",
+            "a positive xcr:FocalLength35mm is missing",
+        ),
+        (
+            "<xcr:Rotation>",
+            "<xcr:Rotation>1 ",
+            "xcr:Rotation needs 9 number(s)",
+        ),
+        (
+            "<xcr:Rotation>",
+            "<xcr:Rotation>1 0 0 0 1 0 0 0 -1</xcr:Rotation><xcr:R>",
+            "broken xml",
+        ),
+        (
+            "<xcr:Rotation>",
+            "<xcr:Rotation>1 0 0 0 1 0 0 0 -1</xcr:Rotation><xcr:Rotation>",
+            "xcr:Rotation is no rotation",
+        ),
+        (
+            "xcr:Rotation>",
+            "xcr:Turn>",
+            "no aligned camera in the file (1 without",
+        ),
+    ] {
+        check("realitycapture/xmp/brown3t2.xmp", "brown3t2.xmp", from, to, part);
+    }
+
+    std::fs::copy(fixture("bundler/dam.list.txt"), photos.path().join("list.txt")).unwrap();
+    for (from, to, part) in [
+        ("v0.3", "v0.9", "not a Bundler file"),
+        ("\n3 5\n", "\n3 x\n", "expected the numbers of photos and points"),
+        ("\n3 5\n", "\n99999999999999 5\n", "names 3"),
+        ("\n3 5\n", "\n3 9\n", "point 6 needs its place, colour and views"),
+        ("\n290.5 0 0\n", "\n-290.5 0 0\n", "photo photo_1.jpg"),
+        ("\n290.5 0 0\n", "\n290.5 inf 0\n", "expected 15 numbers"),
+        (" -9\n", " 9\n", "export as Bundler v0.3 (negative Z)"),
+        ("", "", "none of them can be read"),
+    ] {
+        check("bundler/dam.bundle.out", "cut.out", from, to, part);
+    }
+    std::fs::remove_file(photos.path().join("list.txt")).unwrap();
+    check("bundler/dam.bundle.out", "cut.out", "", "", "cut.list.txt");
+}
+
+#[test]
+fn files_of_other_programs_that_cannot_be_read_say_why() {
+    let folder = tempfile::tempdir().unwrap();
+    for (source, from, to, part) in [
+        (
+            "pix4d/dam_calibrated_camera_parameters.txt",
+            "\n0 0 1\n",
+            "\n0 0\n",
+            "line 12: expected 3 numbers",
+        ),
+        (
+            "pix4d/dam_calibrated_camera_parameters.txt",
+            "2900.5 0",
+            "-2900.5 0",
+            "photo DJI 0001.JPG: its focal lengths must be positive",
+        ),
+        (
+            "sfm_data.json",
+            "\"disto_k1\": [",
+            "\"disto_k1\": [1,",
+            "camera of view k1.jpg: its lens has a wrong number of parameters",
+        ),
+        (
+            "sfm_data.json",
+            "\"rotation\": [",
+            "\"rotation\": [[0, 0, 0],",
+            "view pinhole.jpg: its pose needs a rotation of 3 x 3 and a center",
+        ),
+        (
+            "transforms.json",
+            "\"OPENCV\"",
+            "\"EQUIRECTANGULAR\"",
+            "camera model EQUIRECTANGULAR of photo",
+        ),
+        (
+            "transforms.json",
+            "\"w\": 4000",
+            "\"w\": -1",
+            "a positive w is missing",
+        ),
+        (
+            "transforms.json",
+            "\"applied_transform\": [\n  [",
+            "\"applied_transform\": [[],\n  [",
+            "applied_transform: expected 3 or 4 rows of 4 numbers",
+        ),
+    ] {
+        let name = Path::new(source).file_name().unwrap();
+        let path = folder.path().join(name);
+        let good = std::fs::read_to_string(fixture(source)).unwrap();
+        assert!(good.contains(from), "{from}");
+        std::fs::write(&path, good.replacen(from, to, 1)).unwrap();
+        let error = message(&path);
+        let (place, problem) = part.split_once(": ").unwrap_or(("", part));
+        assert!(error.contains(place) && error.contains(problem), "{error}");
+    }
+    // Every cut at the end of a line but the last of a photo is an error.
+    let good = std::fs::read_to_string(fixture("pix4d/dam_calibrated_camera_parameters.txt")).unwrap();
+    let path = folder.path().join("cut_calibrated_camera_parameters.txt");
+    for (number, (end, _)) in good.match_indices('\n').enumerate() {
+        std::fs::write(&path, &good[..end]).unwrap();
+        assert_eq!(
+            read_cameras(&path).is_ok(),
+            [17, 27].contains(&number),
+            "{number}"
+        );
+    }
+}
+
+fn message(path: &Path) -> String {
+    let error = read_cameras(path).unwrap_err();
+    let text = error.to_string();
+    let file = path.file_name().unwrap().to_string_lossy();
+    assert!(text.contains(&*file), "{text} names the file");
+    text
+}
+
+#[test]
+fn colmap_folders_that_cannot_be_read_say_why() {
+    let fov = message(&fixture("rejected/fov"));
+    assert!(fov.contains("FOV") && fov.contains("photo_1.jpg"), "{fov}");
+    let missing = message(&fixture("rejected/missing_parameter"));
+    assert!(
+        missing.contains("OPENCV has 8 parameters, found 7") && missing.contains("line 1"),
+        "{missing}"
+    );
+    let lines = message(&fixture("rejected/no_points_lines"));
+    assert!(
+        lines.contains("line 2") && lines.contains("image points"),
+        "{lines}"
+    );
+    assert!(message(&fixture("rejected")).contains("not a camera file"));
+}
+
+#[test]
+fn every_truncation_of_a_binary_file_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(
+        fixture("colmap_bin/cameras.bin"),
+        folder.path().join("cameras.bin"),
+    )
+    .unwrap();
+    let bytes = std::fs::read(fixture("colmap_bin/images.bin")).unwrap();
+    for length in (0..bytes.len()).step_by(13) {
+        std::fs::write(folder.path().join("images.bin"), &bytes[..length]).unwrap();
+        let error = read_cameras(folder.path()).unwrap_err();
+        assert!(error.to_string().contains("complete"), "{length}: {error}");
+    }
+}
+
+#[test]
+fn metashape_files_that_cannot_be_read_say_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cameras.xml");
+    let good = std::fs::read_to_string(fixture("metashape.xml")).unwrap();
+    let check = |text: String, parts: &[&str]| {
+        std::fs::write(&path, text).unwrap();
+        let error = message(&path);
+        for part in parts {
+            assert!(error.contains(part), "{error} has {part}");
+        }
+    };
+    check(good[..good.len() / 2].to_owned(), &["line", "complete"]);
+    check(String::new(), &["no xml element"]);
+    check("<svg/>".to_owned(), &["<svg>", "<document>"]);
+    check("<document/>".to_owned(), &["no aligned camera"]);
+    check(
+        good.replace("<transform>", "<other>")
+            .replace("</transform>", "</other>"),
+        &["no aligned camera", "7 without"],
+    );
+    check(
+        good.replace("fisheye", "spherical"),
+        &["spherical", "DJI_0002.v2"],
+    );
+    check(
+        good.replace("<f>2897.25", "<f>nonsense"),
+        &["<f>", "line", "nonsense"],
+    );
+    check(
+        good.replace("sensor_id=\"7\"", "sensor_id=\"70\""),
+        &["70", "line"],
+    );
+    check(
+        good.replace("LOCAL_CS[", "PROJCS["),
+        &["names no geographic system", "local coordinates"],
+    );
+    let scaled = good.replace("<scale locked=\"true\">", "<scale locked=\"true\">-");
+    check(scaled, &["scale must be positive"]);
+}
+
+#[test]
+fn other_files_are_not_camera_files() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(matches!(
+        read_cameras(folder.path()),
+        Err(CameraError::UnknownFormat { .. })
+    ));
+    let path = folder.path().join("reconstruction.json");
+    std::fs::write(&path, "[{\"cameras\": 3}]").unwrap();
+    assert!(message(&path).contains("line 1"));
+    assert!(message(&folder.path().join("cameras.las")).contains("not a camera file"));
+    assert!(message(&folder.path().join("missing.xml")).contains("cannot read"));
+}
+
+/// Views that differ in pose and lens.
+fn views(lenses: &[Distortion], skew_px: f64) -> Vec<View> {
+    let view = |(i, lens): (usize, &Distortion)| {
+        let angle = i as f64 + 0.3;
+        View {
+            image: ImageId(i as u32),
+            name: format!("left & right <{i}>.jpg"),
+            camera: Camera {
+                focal_px: [2_900.123_456_789_1, 2899.1],
+                center_px: [2010.3, 1480.0 / 3.0],
+                skew_px,
+                distortion: lens.clone(),
+                ..Camera::pinhole(4000, 3000, 1.0)
+            },
+            cam_from_world: Rigid3::from_parts(
+                Translation3::new(4.5e5 / 3.0, 5.6e6 / 7.0, -angle),
+                UnitQuaternion::from_euler_angles(angle, 0.1 * angle, -angle),
+            ),
+        }
+    };
+    lenses.iter().enumerate().map(view).collect()
+}
+
+fn assert_same(a: &[View], b: &[View]) {
+    assert_eq!(a.len(), b.len());
+    for (a, b) in a.iter().zip(b) {
+        assert_eq!((&a.name, a.image), (&b.name, b.image));
+        for i in 0..100 {
+            let pixel = [f64::from(i % 10) * 400.0 + 1.0, f64::from(i / 10) * 300.0 + 1.0];
+            let (Some((origin, direction)), Some((origin_b, direction_b))) = (a.ray(pixel), b.ray(pixel))
+            else {
+                panic!("{pixel:?}");
+            };
+            assert!((origin - origin_b).norm() < 1e-8, "{}", origin - origin_b);
+            assert!((direction - direction_b).norm() < 1e-13);
+        }
+    }
+}
+
+#[test]
+fn written_metashape_files_read_back() {
+    let lenses = [
+        Distortion::None,
+        Distortion::brown([-0.11, 0.03, -0.01, 0.002], [0.0; 3], [0.001, -0.002]),
+        Distortion::fisheye([0.03, -0.01, 0.0, 0.0], [0.001, -0.002]),
+        Distortion::None,
+    ];
+    let mut written = views(&lenses, -1.25);
+    written[3].camera.near = Some(NearPlane {
+        normal: Vector3::new(0.1, -0.2, 0.95).normalize(),
+        distance_m: 11.0 / 3.0,
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cameras.xml");
+    write_metashape(&path, &written, None).unwrap();
+    let read = read_cameras(&path).unwrap();
+    assert_same(&written, &read.views);
+    assert!(
+        written
+            .iter()
+            .zip(&read.views)
+            .all(|(a, b)| a.camera.near == b.camera.near)
+    );
+    assert!(read.warnings.is_empty() && read.skipped.is_empty());
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert_eq!(text.matches("<sensor ").count(), 4);
+    let rational = views(&[Distortion::brown([0.1; 4], [0.1; 3], [0.0; 2])], 0.0);
+    assert!(write_metashape(&path, &rational, None).is_err());
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+}
+
+#[test]
+fn written_colmap_folders_read_back() {
+    let lenses = [
+        Distortion::brown([-0.11, 0.03, 0.0, 0.0], [0.0; 3], [0.001, -0.002]),
+        Distortion::None,
+        Distortion::brown([-0.11, 0.03, -0.01, 0.0], [0.02, -0.01, 0.005], [0.001, -0.002]),
+        Distortion::fisheye([0.03, -0.01, 0.002, 0.001], [0.0; 2]),
+    ];
+    let written = views(&lenses, 0.0);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sparse/0");
+    write_colmap(&path, &written).unwrap();
+    assert_same(&written, &read_cameras(folder.path()).unwrap().views);
+    assert!(write_colmap(&path, &views(&lenses, 0.5)).is_err());
+}

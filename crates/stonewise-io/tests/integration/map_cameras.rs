@@ -1,0 +1,333 @@
+//! Map projections and earth-centred cameras against PROJ (testdata/crs).
+
+use nalgebra::Point3;
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use stonewise_core::geometry::View;
+use stonewise_io::cameras::{CameraError, MapFrame, read_cameras_on_map};
+use stonewise_io::crs::{Coordinates, Crs, Geodetic, Geoid, MapSystem, is_in_feet};
+
+fn expected() -> Value {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/crs/expected.json");
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|v| v.as_f64().unwrap())
+        .collect()
+}
+
+fn system(text: &str) -> MapSystem {
+    MapSystem::parse(text).unwrap().unwrap()
+}
+
+#[test]
+fn systems_in_feet_are_those_of_proj() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/crs/units.json");
+    let units: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    for (kind, in_feet) in [("feet", true), ("other", false)] {
+        let codes = numbers(&units[kind]);
+        assert!(codes.len() > 500);
+        for code in codes {
+            assert_eq!(is_in_feet(code as u32), in_feet, "EPSG:{code}");
+        }
+    }
+}
+
+#[test]
+fn map_coordinates_are_those_of_proj() {
+    let expected = expected();
+    for row in expected["systems"].as_array().unwrap() {
+        let by_code = format!("EPSG:{}", row["epsg"]);
+        let texts = [
+            row["wkt1"].as_str().unwrap(),
+            row["wkt2"].as_str().unwrap(),
+            &by_code,
+        ];
+        for text in texts {
+            let found = system(text);
+            assert!(found.shares_datum(&system(&by_code)), "{text}");
+            let Coordinates::Projected(projection) = found.coordinates else {
+                panic!("not projected: {text}");
+            };
+            for point in row["points"].as_array().unwrap() {
+                let point = numbers(point);
+                let at = Geodetic {
+                    latitude: point[0].to_radians(),
+                    longitude: point[1].to_radians(),
+                    height_m: 0.0,
+                };
+                let [east, north] = projection.forward(&found.ellipsoid, &at);
+                let error = (east - point[2]).hypot(north - point[3]);
+                assert!(error < 1e-4, "{by_code}: {error} m at {point:?}");
+            }
+            let crs = Crs::parse(text).unwrap();
+            assert_eq!(format!("EPSG:{}", crs.epsg), by_code);
+        }
+    }
+}
+
+fn metashape(folder: &Path, crs: &str, poses: &[&Value]) -> PathBuf {
+    let mut cameras = String::new();
+    for (id, pose) in poses.iter().enumerate() {
+        let pose: Vec<String> = numbers(pose).iter().map(|v| format!("{v:.17e}")).collect();
+        let _ = write!(
+            cameras,
+            "<camera id=\"{id}\" sensor_id=\"0\" label=\"{id}.jpg\"><transform>{}</transform></camera>",
+            pose.join(" ")
+        );
+    }
+    let crs = crs.replace('"', "&quot;");
+    let text = format!(
+        "<document version=\"2.0.0\"><chunk label=\"wall\"><sensors><sensor id=\"0\" type=\"frame\">\
+         <resolution width=\"4000\" height=\"3000\"/><calibration type=\"frame\" class=\"adjusted\"><f>3000</f></calibration>\
+         </sensor></sensors><cameras>{cameras}</cameras><reference>{crs}</reference></chunk></document>"
+    );
+    let path = folder.join("cameras.xml");
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+fn check_view(view: &View, row: &Value, shift: [f64; 3]) -> f64 {
+    let shift = Point3::from(shift).coords;
+    let centre = Point3::from_slice(&numbers(&row["centre"]));
+    let error = (view.centre() + shift - centre).norm();
+    assert!(error < 1e-4, "centre {error} m away: {row}");
+    let points = row["points"].as_array().unwrap().iter().map(numbers);
+    points
+        .map(|p| {
+            let seen = view
+                .project(&(Point3::new(p[0], p[1], p[2]) - shift))
+                .unwrap()
+                .pixel;
+            (seen[0] - p[3]).hypot(seen[1] - p[4])
+        })
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn earth_centred_cameras_see_the_clouds_where_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let expected = expected();
+    let rows = expected["cameras"].as_array().unwrap();
+    for code in [25832, 31467, 32733, 2154] {
+        let rows: Vec<&Value> = rows.iter().filter(|r| r["epsg"] == code).collect();
+        let poses: Vec<&Value> = rows.iter().map(|r| &r["pose"]).collect();
+        assert_eq!(rows.len(), 4);
+        let named = format!("EPSG:{code}");
+        let chunk = Crs::parse(&named).unwrap().wkt;
+        let false_origin = [400_000.0, 5_000_000.0, -2.5];
+        let shifted = MapFrame {
+            crs: Some(named),
+            false_origin,
+            geoid: None,
+        };
+        for (map, shift) in [(MapFrame::default(), [0.0; 3]), (shifted, false_origin)] {
+            let file = read_cameras_on_map(&metashape(folder.path(), &chunk, &poses), None, &map).unwrap();
+            for (view, row) in file.views.iter().zip(&rows) {
+                // The curvature of the earth over 100 m, at 3000 px per radian.
+                let worst = check_view(view, row, shift);
+                assert!(worst < 0.05, "EPSG:{code}: {worst} px");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_chunk_in_degrees_comes_to_the_system_of_the_clouds() {
+    let folder = tempfile::tempdir().unwrap();
+    let expected = expected();
+    let row = expected["cameras"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|r| r["epsg"] == 25832);
+    let row = row.unwrap();
+    // WGS 84 stands for ETRS89, as map programs have it.
+    let path = metashape(
+        folder.path(),
+        &Crs::parse("EPSG:4326").unwrap().wkt,
+        &[&row["pose"]],
+    );
+    let map = |crs: &str| MapFrame {
+        crs: Some(crs.to_owned()),
+        ..MapFrame::default()
+    };
+    let file = read_cameras_on_map(&path, None, &map("EPSG:25832")).unwrap();
+    assert!(check_view(&file.views[0], row, [0.0; 3]) < 0.05);
+    assert_eq!(file.crs.as_deref(), Some("EPSG:25832"));
+    let refused = |map: &MapFrame| match read_cameras_on_map(&path, None, map).unwrap_err() {
+        CameraError::UnsupportedCrs { reason, .. } => reason,
+        other => panic!("{other}"),
+    };
+    assert_eq!(
+        refused(&MapFrame::default()),
+        "the clouds name no system: give theirs as crs under [project]"
+    );
+    assert!(refused(&map("EPSG:31467")).contains("another geodetic datum"));
+    assert!(refused(&map("EPSG:2056")).contains("another geodetic datum"));
+    assert!(refused(&map("EPSG:5513")).contains("EPSG:5513 is not among the systems known by their number"));
+    assert!(refused(&map("EPSG:4326")).contains("the clouds are in degrees (WGS 84)"));
+    let swiss = "PROJCS[\"CH1903+ / LV95\",GEOGCS[\"CH1903+\",DATUM[\"CH1903+\",SPHEROID[\"Bessel 1841\",6377397.155,299.1528128]]],\
+                 PROJECTION[\"Hotine_Oblique_Mercator_Azimuth_Center\"],UNIT[\"metre\",1]]";
+    assert!(
+        refused(&map(swiss))
+            .contains("its projection, \"Hotine_Oblique_Mercator_Azimuth_Center\", is not covered")
+    );
+    let feet = Crs::parse("EPSG:32632")
+        .unwrap()
+        .wkt
+        .replace("[\"metre\",1]", "[\"US survey foot\",0.3048006]");
+    assert!(refused(&map(&feet)).contains("its unit is not the metre"));
+    let utm = Crs::parse("EPSG:25832").unwrap().wkt;
+    let above_geoid =
+        format!("COMPD_CS[\"both\",{utm},VERT_CS[\"DHHN2016 height\",VERT_DATUM[\"DHHN2016\",2005]]]");
+    let above_geoid = map(&above_geoid);
+    assert!(refused(&above_geoid).contains("above a geoid (DHHN2016 height): give its grid (GTX) as geoid"));
+}
+
+fn geoid_file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../testdata/crs")
+        .join(name)
+}
+
+#[test]
+fn heights_of_a_geoid_are_those_of_proj() {
+    let expected: Value =
+        serde_json::from_str(&std::fs::read_to_string(geoid_file("geoid.json")).unwrap()).unwrap();
+    let geoid = Geoid::read(&geoid_file("geoid.gtx")).unwrap();
+    let at = |latitude: f64, longitude: f64| Geodetic {
+        latitude: latitude.to_radians(),
+        longitude: longitude.to_radians(),
+        height_m: 100.0,
+    };
+    let points: Vec<Vec<f64>> = expected["points"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(numbers)
+        .collect();
+    assert_eq!(points.len(), 40);
+    for p in points {
+        for turn in [0.0, 360.0] {
+            let height = geoid.height_m(&at(p[0], p[1] + turn)).unwrap();
+            assert!((height - p[2]).abs() < 1e-5, "{height} is not {}", p[2]);
+        }
+    }
+    // The corners of the grid, beside it, and beside the node without a height.
+    assert!(geoid.height_m(&at(46.0, 4.5)).is_some() && geoid.height_m(&at(52.0, 4.5)).is_some());
+    for (latitude, longitude) in [
+        (45.99, 5.0),
+        (52.01, 5.0),
+        (47.0, 4.49),
+        (47.0, 10.76),
+        (51.9, 10.7),
+    ] {
+        assert_eq!(geoid.height_m(&at(latitude, longitude)), None);
+    }
+}
+
+#[test]
+fn cameras_come_to_clouds_whose_heights_are_above_a_geoid() {
+    let folder = tempfile::tempdir().unwrap();
+    let expected = expected();
+    let rows = expected["cameras"].as_array().unwrap().iter();
+    let rows: Vec<&Value> = rows.filter(|r| r["epsg"] == 25832).collect();
+    let poses: Vec<&Value> = rows.iter().map(|r| &r["pose"]).collect();
+    let heights: Value =
+        serde_json::from_str(&std::fs::read_to_string(geoid_file("geoid.json")).unwrap()).unwrap();
+    let utm = Crs::parse("EPSG:25832").unwrap().wkt;
+    let compound =
+        format!("COMPD_CS[\"both\",{utm},VERT_CS[\"DHHN2016 height\",VERT_DATUM[\"DHHN2016\",2005]]]");
+    let path = metashape(folder.path(), &compound, &poses);
+    for crs in [None, Some(compound), Some("EPSG:25832".to_owned())] {
+        let map = MapFrame {
+            crs,
+            geoid: Some(geoid_file("geoid.gtx")),
+            ..MapFrame::default()
+        };
+        let file = read_cameras_on_map(&path, None, &map).unwrap();
+        for ((view, row), height) in file
+            .views
+            .iter()
+            .zip(&rows)
+            .zip(heights["cameras"].as_array().unwrap())
+        {
+            let centre = numbers(&row["centre"]);
+            let error = view.centre() - Point3::new(centre[0], centre[1], centre[2] - numbers(height)[2]);
+            assert!(error.norm() < 1e-4, "{error}");
+        }
+    }
+    // Off the grid.
+    let south = rows_of(&expected, 32733);
+    let path = metashape(
+        folder.path(),
+        &Crs::parse("EPSG:32733").unwrap().wkt,
+        &[&south["pose"]],
+    );
+    let map = MapFrame {
+        geoid: Some(geoid_file("geoid.gtx")),
+        ..MapFrame::default()
+    };
+    let error = read_cameras_on_map(&path, None, &map).unwrap_err().to_string();
+    assert!(error.contains("off the grid of the geoid"), "{error}");
+}
+
+fn rows_of(expected: &Value, code: u32) -> Value {
+    let rows = expected["cameras"].as_array().unwrap();
+    rows.iter().find(|r| r["epsg"] == code).unwrap().clone()
+}
+
+#[test]
+fn grids_that_are_cut_or_impossible_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = std::fs::read(geoid_file("geoid.gtx")).unwrap();
+    let path = folder.path().join("bad.gtx");
+    let refused = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        let error = Geoid::read(&path).unwrap_err().to_string();
+        assert!(
+            error.contains("give a GTX file") && error.contains("bad.gtx"),
+            "{error}"
+        );
+    };
+    (0..good.len()).for_each(|end| refused(&good[..end]));
+    // Rows and columns whose product overflows or fits the length, steps and corners off the earth.
+    for (place, bytes) in [
+        (32, [0x7f; 8].as_slice()),
+        (32, &[0xff; 4]),
+        (32, &[0, 0, 0, 1, 0, 0, 0, 54]),
+        (16, &0f64.to_be_bytes()),
+        (24, &f64::NAN.to_be_bytes()),
+        (0, &91f64.to_be_bytes()),
+        (8, &f64::INFINITY.to_be_bytes()),
+    ] {
+        let mut bad = good.clone();
+        bad[place..place + bytes.len()].copy_from_slice(bytes);
+        refused(&bad);
+    }
+    assert!(
+        Geoid::read(&folder.path().join("none.gtx"))
+            .unwrap_err()
+            .to_string()
+            .contains("cannot read the geoid")
+    );
+}
+
+#[test]
+fn poses_that_are_not_earth_centred_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let local = serde_json::json!([1, 0, 0, 4.0, 0, 1, 0, 5.0, 0, 0, 1, 6.0, 0, 0, 0, 1]);
+    let path = metashape(folder.path(), &Crs::parse("EPSG:25832").unwrap().wkt, &[&local]);
+    let error = read_cameras_on_map(&path, None, &MapFrame::default())
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("photo 0.jpg would be -63"), "{error}");
+    assert!(error.contains("not earth-centred"), "{error}");
+}
