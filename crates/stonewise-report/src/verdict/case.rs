@@ -70,8 +70,9 @@ impl Case {
     /// Whether this can be a motion of the stone. Where the registration error is unknown, a motion against the common
     /// one is a change of the wall's shape or that of a loose stone.
     pub(super) fn may_have_moved(&self, stone: &StoneMeasured) -> bool {
-        let shape_changed = self.deformation.as_ref().is_some_and(|found| found.shown);
-        self.has_datum() || shape_changed || stone.loose || !stone.shape_tested
+        let shape_kept = self.deformation.as_ref().is_some_and(|found| !found.shown);
+        let stays = shape_kept && stone.shape_tested && !stone.loose;
+        self.has_datum() || !stays
     }
 
     /// Whether intervals hold the registration error, so that they say something about the wall as a whole.
