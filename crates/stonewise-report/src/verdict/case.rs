@@ -46,7 +46,7 @@ pub(crate) struct StoneMeasured {
     pub neighbours: Estimate,
     pub above_limit: bool,
     pub loose: bool,
-    /// Its part of the wall was tested for a change of its shape.
+    /// It belongs to the largest part of the wall, which was tested for a change of shape.
     pub shape_tested: bool,
     pub detection_limit_m: f64,
 }
@@ -67,8 +67,8 @@ impl Case {
         !self.not_converged && !self.in_doubt
     }
 
-    /// Whether this can be a motion of the stone. Where the registration error is unknown, a motion against the common
-    /// one is a change of the wall's shape or that of a loose stone.
+    /// Whether a significant motion of this stone may be reported as moved. Where the registration error is unknown,
+    /// this needs a change of the wall's shape or a loose stone, provided that the shape was tested around the stone.
     pub(super) fn may_have_moved(&self, stone: &StoneMeasured) -> bool {
         let shape_kept = self.deformation.as_ref().is_some_and(|found| !found.shown);
         let stays = shape_kept && stone.shape_tested && !stone.loose;

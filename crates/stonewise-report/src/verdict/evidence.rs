@@ -56,7 +56,7 @@ fn stones(results: &ResultSet) -> Vec<StoneCase> {
             },
             above_limit: motion.significant,
             loose: motion.loose,
-            shape_tested: motion.deformation_sd[0].is_some(),
+            shape_tested: stone.body_id == Some(1) && motion.deformation_sd[0].is_some(),
             detection_limit_m: motion.detection_limit_m,
         }),
     };
