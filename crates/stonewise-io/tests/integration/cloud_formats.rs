@@ -339,6 +339,19 @@ fn no_labels(chunk: &PointChunk) -> Result<Vec<PointLabel>, CloudError> {
     Ok(vec![PointLabel::default(); chunk.len()])
 }
 
+/// Labels and motions that follow from the index of a record: two of three have a stone, one of them a motion.
+pub fn labels_by_index(chunk: &PointChunk) -> Result<Vec<PointLabel>, CloudError> {
+    let label = |&index: &u64| PointLabel {
+        stone: (!index.is_multiple_of(3)).then_some(StoneId(index as u32)),
+        motion: (index % 3 == 2).then_some(PointMotion {
+            displacement_m: Vector3::new(index as f32, 0.02, -0.05),
+            significant: index.is_multiple_of(2),
+        }),
+        ..PointLabel::default()
+    };
+    Ok(chunk.indices.iter().map(label).collect())
+}
+
 #[test]
 fn a_labelled_copy_of_las_keeps_records_and_descriptions() {
     let folder = tempfile::tempdir().unwrap();
@@ -412,18 +425,7 @@ fn labels_and_motions_stand_behind_each_record() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("labelled.laz");
     let input = fixture("las14_format7_extra.laz");
-    write_labelled(&input, &out, LabelColumns::StoneAndMotion, |chunk| {
-        let label = |&index: &u64| PointLabel {
-            stone: (!index.is_multiple_of(3)).then_some(StoneId(index as u32)),
-            motion: (index % 3 == 2).then_some(PointMotion {
-                displacement_m: Vector3::new(index as f32, 0.02, -0.05),
-                significant: index.is_multiple_of(2),
-            }),
-            ..PointLabel::default()
-        };
-        Ok::<_, CloudError>(chunk.indices.iter().map(label).collect())
-    })
-    .unwrap();
+    write_labelled(&input, &out, LabelColumns::StoneAndMotion, labels_by_index).unwrap();
     let data = las::Reader::from_path(&out).unwrap().read_all().unwrap();
     for (i, record) in data.raw_bytes().chunks(data.record_len()).enumerate() {
         // 36 bytes of format 7, 4 + 12 of the input's own dimensions.

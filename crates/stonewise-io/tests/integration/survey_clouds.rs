@@ -1,14 +1,11 @@
 //! Clouds of the surveys, where they are at hand.
 
+use crate::cloud_formats::labels_by_index;
 use std::time::Instant;
 use stonewise_testing::survey;
 
-use nalgebra::Vector3;
 use stonewise_core::geometry::Bounds;
-use stonewise_core::id::StoneId;
-use stonewise_io::cloud::{
-    CloudError, LabelColumns, PointLabel, PointMotion, cloud_info, read_cloud, write_labelled,
-};
+use stonewise_io::cloud::{CloudError, LabelColumns, cloud_info, read_cloud, write_labelled};
 
 #[test]
 fn counts_and_bounds_agree_with_the_headers() {
@@ -45,18 +42,7 @@ fn a_labelled_copy_keeps_every_attribute() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("labelled.laz");
     let started = Instant::now();
-    let summary = write_labelled(&path, &out, LabelColumns::StoneAndMotion, |chunk| {
-        let label = |&index: &u64| PointLabel {
-            stone: (!index.is_multiple_of(3)).then_some(StoneId(index as u32)),
-            motion: (index % 3 == 2).then_some(PointMotion {
-                displacement_m: Vector3::new(index as f32, 0.02, -0.05),
-                significant: index.is_multiple_of(2),
-            }),
-            ..PointLabel::default()
-        };
-        Ok::<_, CloudError>(chunk.indices.iter().map(label).collect())
-    })
-    .unwrap();
+    let summary = write_labelled(&path, &out, LabelColumns::StoneAndMotion, labels_by_index).unwrap();
     let rate = summary.records as f64 / started.elapsed().as_secs_f64();
     println!("labelled copy: {:.2} million points/s", rate / 1e6);
 

@@ -1,4 +1,4 @@
-//! The studio, asked as a browser or an attacker asks it.
+//! The studio under the requests of browsers and of attackers.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on must stop")]
 
 mod attacks;
