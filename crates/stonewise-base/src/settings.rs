@@ -48,7 +48,7 @@ impl Params for SegmentParams {
 pub struct Settings {
     /// How clouds are cut.
     pub ingest: IngestParams,
-    /// Views of the clouds of epochs without photos.
+    /// Views of the clouds of epochs without photos, or beside photos.
     pub views: ViewParams,
     /// Stones in photos without masks.
     pub segment: SegmentParams,

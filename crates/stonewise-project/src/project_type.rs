@@ -144,6 +144,13 @@ impl Project {
         !epoch.is_reference() && self.settings.registration.align == Align::Stones
     }
 
+    /// Whether the detector looks at views of the clouds of an epoch: in place of photos, or beside them where the
+    /// project asks for both.
+    pub fn has_views(&self, epoch: EpochId) -> bool {
+        let own = &self.epochs[epoch];
+        own.photos.is_none() || self.settings.views.beside_photos && own.masks.is_none()
+    }
+
     /// Two clouds without photos, for comparisons of clouds alone.
     pub fn of_clouds(before: &Path, after: &Path, m3c2: M3c2Params) -> Self {
         let epoch = |name: &str, cloud: &Path| Epoch {

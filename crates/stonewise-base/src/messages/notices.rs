@@ -9,16 +9,16 @@ messages! {
             "Punkte ohne endliche Koordinaten, weggelassen: {n}";
 
         VIEWS_OF_COLOURS = "views":
-            "no photos: stones are looked for in {n} views of the cloud's colours",
-            "keine Fotos: Steine werden in {n} Ansichten der Farben der Punktwolke gesucht";
+            "stones are looked for in {n} views of the cloud's colours",
+            "Steine werden in {n} Ansichten der Farben der Punktwolke gesucht";
 
         VIEWS_OF_INTENSITIES = "views":
-            "no photos: stones are looked for in {n} views of the cloud's intensities",
-            "keine Fotos: Steine werden in {n} Ansichten der Intensitäten der Punktwolke gesucht";
+            "stones are looked for in {n} views of the cloud's intensities",
+            "Steine werden in {n} Ansichten der Intensitäten der Punktwolke gesucht";
 
         VIEWS_OF_RELIEF = "views":
-            "no photos: stones are looked for in {n} views of the cloud's relief, shaded",
-            "keine Fotos: Steine werden in {n} Ansichten des schattierten Reliefs der Punktwolke gesucht";
+            "stones are looked for in {n} views of the cloud's relief, shaded",
+            "Steine werden in {n} Ansichten des schattierten Reliefs der Punktwolke gesucht";
 
         AUTO_STABLE = "auto-stable":
             "auto_stable: areas off the wall ({count} found) are taken for stable, as far as they agree with each other",

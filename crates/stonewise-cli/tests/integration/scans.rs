@@ -1,6 +1,6 @@
 //! Surveys without photos: two scans and one command.
 
-use crate::support::{outcome, stonewise, survey};
+use crate::support::{copy_of, outcome, stonewise, survey};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -58,6 +58,105 @@ fn two_scans_alone_are_run_and_scored_against_the_truth() {
         .iter()
         .filter(|s| s["step"] == "views-1");
     assert!(views.map(|s| s["resumed"].clone()).all(|r| r == true), "{log}");
+}
+
+#[test]
+fn views_beside_photos_show_stones_and_track_none() {
+    let survey = copy_of(survey());
+    let epoch = |number: u8| {
+        format!(
+            "[[epochs]]\nname = \"{number}\"\nclouds = [\"epoch{number}/cloud_tls.laz\"]\n\
+             images = \"epoch{number}/images\"\ncameras = \"epoch{number}/cameras_metashape.xml\"\n"
+        )
+    };
+    let project = survey.path().join("beside.toml");
+    let lines = format!(
+        "{}{}[views]\nbeside_photos = true\n[project]\nname = \"Both\"\n",
+        epoch(1),
+        epoch(2)
+    );
+    fs::write(&project, lines).unwrap();
+    let results = survey.path().join("results");
+    let (code, log) = outcome(stonewise().arg("run").arg(&project).arg("--out").arg(&results));
+    assert!(code == 0 || code == 3, "{code}: {log}");
+
+    let record = json(&results.join("run.json"));
+    assert_eq!(record["epochs"][0]["photos"], 2);
+    let audit = fs::read_to_string(results.join("audit_epoch1.csv")).unwrap();
+    assert!(audit.contains("view_001.png"), "{audit}");
+    let stones = fs::read_to_string(results.join("stones.csv")).unwrap();
+    let column = stones
+        .lines()
+        .next()
+        .unwrap()
+        .split(',')
+        .position(|c| c == "photos")
+        .unwrap();
+    let shown = stones
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').nth(column).unwrap().parse::<u32>().unwrap());
+    assert!(shown.max() > Some(2), "{stones}");
+    let registration = json(&results.join("registration.json"));
+    let tracked = registration["photos"]["poses_px"].as_array().unwrap();
+    assert!(
+        !tracked.is_empty() && !registration["photos"].to_string().contains("view_"),
+        "{registration}"
+    );
+}
+
+/// Where views have too many pixels, pixels grow until the stones of a first look are 10 pixels across. The bounds are
+/// wide because the first look also finds parts of stones and of the hut.
+#[test]
+fn pixels_of_views_fit_the_stones() {
+    let out = tempfile::tempdir().unwrap();
+    let project = out.path().join("stonewise.toml");
+    let scan = |epoch: u8| survey().join(format!("epoch{epoch}/cloud_tls.laz"));
+    let lines = format!(
+        "[project]\nname = \"Large\"\n[views]\nmegapixels = 0.05\nstone_px = 10.0\n\
+         [[epochs]]\nname = \"1\"\nclouds = [{:?}]\n[[epochs]]\nname = \"2\"\nclouds = [{:?}]\n",
+        scan(1),
+        scan(2)
+    );
+    fs::write(&project, lines).unwrap();
+    let results = out.path().join("results");
+    let (code, log) = outcome(
+        stonewise()
+            .arg("segment")
+            .arg(&project)
+            .arg("--out")
+            .arg(&results),
+    );
+    assert_eq!(code, 0, "{log}");
+    let step = fs::read_dir(results.join("work/views-1"))
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap();
+    let cameras = fs::read_to_string(step.path().join("cameras.xml")).unwrap();
+    let focal_px = cameras
+        .split("<f>")
+        .skip(1)
+        .map(|f| f.split('<').next().unwrap().parse::<f64>().unwrap());
+    // Seen from 12 m where nothing hides the wall.
+    let pixel_m = 12.0 / focal_px.fold(0.0, f64::max);
+
+    let truth = fs::read_to_string(survey().join("truth/stones.csv")).unwrap();
+    let mut rows = truth.lines().map(|row| row.split(',').collect::<Vec<_>>());
+    let head = rows.next().unwrap();
+    let column = |name: &str| head.iter().position(|c| *c == name).unwrap();
+    let (area, visible) = (column("area_m2"), column("vis_tls"));
+    let value = |row: &[&str], column: usize| row[column].parse::<f64>().unwrap();
+    let seen = rows.filter(|row| value(row, visible) > 0.35);
+    let mut sizes_m: Vec<f64> = seen.map(|row| value(&row, area).sqrt()).collect();
+    sizes_m.sort_by(f64::total_cmp);
+    let across_px = sizes_m[sizes_m.len() / 4] / pixel_m;
+    assert!(
+        (7.0..20.0).contains(&across_px),
+        "{across_px} pixels of {pixel_m} m"
+    );
+    // 0.6 times the distance between points.
+    assert!(pixel_m > 2.0 * 0.6 * 0.008, "{pixel_m}");
 }
 
 #[test]

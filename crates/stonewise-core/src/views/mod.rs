@@ -15,6 +15,6 @@ mod walls;
 
 pub use params::ViewParams;
 pub use picture::Picture;
-pub use plan::{PlannedView, plan_views};
+pub use plan::{PlannedView, megapixels_of, plan_views};
 pub use tone::{PointValues, Shade, Tones, Toning};
 pub use walls::Walls;

@@ -38,11 +38,12 @@ impl<'a> Picture<'a> {
     pub const PIXEL_BYTES: u64 = 24;
 
     /// An empty picture.
-    pub fn new(PlannedView { view, spacing_px }: &'a PlannedView) -> Self {
+    pub fn new(planned: &'a PlannedView) -> Self {
+        let view = &planned.view;
         let (width, height) = (view.camera.width, view.camera.height);
         Self {
             view,
-            spacing_px: *spacing_px,
+            spacing_px: planned.spacing_px,
             nearest: DepthMap::filled(width, height, f32::INFINITY),
             sums: Raster::filled(width, height, [0.0; 5]),
         }
@@ -198,6 +199,8 @@ mod tests {
                 cam_from_world: Rigid3::identity(),
             },
             spacing_px: 1.0,
+            pixel_m: 0.05,
+            is_straight: true,
         }
     }
 

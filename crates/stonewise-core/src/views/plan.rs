@@ -40,16 +40,22 @@ pub struct PlannedView {
     pub view: View,
     /// Distance between the points that it sees, pixels; 1 at least.
     pub spacing_px: f64,
+    /// Size of a pixel on the wall, metres.
+    pub pixel_m: f64,
+    /// Whether it looks at its part of the wall straight on.
+    pub is_straight: bool,
 }
 
 /// Views that cover the walls among the cells of a surface: each part of a wall is seen straight, and from
 /// directions turned to the left, to the right, upwards and downwards.
 ///
-/// `cells`: with normals that point outside. Views are numbered and named in their order. A camera comes nearer
-/// where something hides the wall from it; a part that is hidden from near, too, has no views. Views leave out
-/// what stands more than 20 cm before their part of the wall, and small bodies that stand there have none of
-/// their own.
-pub fn plan_views(cells: &[SurfaceCell], params: &ViewParams) -> Vec<PlannedView> {
+/// `cells`: with normals that point outside. `stone_m`: the size across of the smaller stones, metres; where it is
+/// known, pixels grow until all views fit into [`ViewParams::megapixels`] or these stones are only
+/// [`ViewParams::stone_px`] across. Beyond [`ViewParams::most_megapixels`] they grow in any case. Views are numbered
+/// and named in their order. A camera comes nearer where something hides the wall from it; a part that is hidden from
+/// near, too, has no views. Views leave out what stands more than 20 cm before their part of the wall, and small
+/// bodies that stand there have none of their own.
+pub fn plan_views(cells: &[SurfaceCell], params: &ViewParams, stone_m: Option<f64>) -> Vec<PlannedView> {
     let walls = Walls::among(cells, params.cell_m).cells;
     let least_cells = MANY_CELLS
         .min((LEAST_PART * walls.len() as f64) as usize)
@@ -60,23 +66,59 @@ pub fn plan_views(cells: &[SurfaceCell], params: &ViewParams) -> Vec<PlannedView
         bodies: Bodies::of(&walls),
         least_cells,
     };
-    let views_of = |coarser: f64| views_of(&faces, &scene, coarser, params);
-    let pixels = |views: &[PlannedView]| -> f64 {
-        let cameras = views.iter().map(|planned| &planned.view.camera);
-        cameras.map(|c| f64::from(c.width) * f64::from(c.height)).sum()
-    };
-    let mut coarser = 1.0;
-    let mut views = views_of(coarser);
-    // Margins do not shrink with the pixels, so a second step may be needed.
-    for _ in 0..3 {
-        let excess = pixels(&views) / (1e6 * params.megapixels);
-        if excess <= 1.0 {
-            break;
+    let fitted = |megapixels: f64, largest_m: f64| {
+        let pixels = |coarser: f64| Pixels {
+            least_m: params.pixel_m,
+            coarser,
+            largest_m,
+        };
+        let mut coarser = 1.0;
+        let mut views = views_of(&faces, &scene, &pixels(coarser), params);
+        // Margins do not shrink with the pixels, and pixels that have reached `largest_m` do not grow, so that further
+        // steps may be needed.
+        for _ in 0..3 {
+            let excess = megapixels_of(&views) / megapixels;
+            if excess <= 1.0 {
+                break;
+            }
+            coarser *= excess.sqrt();
+            let before = megapixels_of(&views);
+            views = views_of(&faces, &scene, &pixels(coarser), params);
+            if megapixels_of(&views) >= before {
+                break;
+            }
         }
-        coarser *= excess.sqrt();
-        views = views_of(coarser);
+        views
+    };
+    let seen_well = stone_m.map(|size_m| fitted(params.megapixels, size_m / params.stone_px));
+    seen_well
+        .filter(|views| megapixels_of(views) <= params.most_megapixels)
+        .unwrap_or_else(|| fitted(params.most_megapixels, f64::INFINITY))
+}
+
+/// Pixels of all views together, millions.
+pub fn megapixels_of(views: &[PlannedView]) -> f64 {
+    let cameras = views.iter().map(|planned| &planned.view.camera);
+    1e-6 * cameras
+        .map(|c| f64::from(c.width) * f64::from(c.height))
+        .sum::<f64>()
+}
+
+/// How large pixels are on the wall.
+struct Pixels {
+    /// Least size, metres.
+    least_m: f64,
+    /// Factor by which pixels exceed their finest size.
+    coarser: f64,
+    /// Size up to which `coarser` enlarges them, metres.
+    largest_m: f64,
+}
+
+impl Pixels {
+    fn size_m(&self, spacing_m: f64) -> f64 {
+        let finest_m = self.least_m.max(PIXEL * spacing_m);
+        finest_m.max((self.coarser * finest_m).min(self.largest_m))
     }
-    views
 }
 
 /// What is there.
@@ -131,18 +173,19 @@ fn faces_of<'a>(walls: &[&'a SurfaceCell], params: &ViewParams) -> Vec<Face<'a>>
     faces
 }
 
-/// `coarser`: factor of all pixels.
-fn views_of(faces: &[Face], scene: &Scene, coarser: f64, params: &ViewParams) -> Vec<PlannedView> {
+fn views_of(faces: &[Face], scene: &Scene, pixels: &Pixels, params: &ViewParams) -> Vec<PlannedView> {
     let mut views = Vec::new();
     for face in faces {
-        for target in targets_of(face, scene, coarser, params) {
+        for target in targets_of(face, scene, pixels, params) {
             let Some(distance_m) = target.distance(&face.frame.out, scene.cells, params) else {
                 continue;
             };
-            for direction in directions(&face.frame, params.turn_rad) {
+            for (turn, direction) in directions(&face.frame, params.turn_rad).into_iter().enumerate() {
                 views.push(PlannedView {
                     view: target.view(direction, distance_m, ImageId(views.len() as u32)),
                     spacing_px: (target.spacing_m / target.pixel_m).max(1.0),
+                    pixel_m: target.pixel_m,
+                    is_straight: turn == 0,
                 });
             }
         }
@@ -177,7 +220,7 @@ struct Target<'a> {
 }
 
 /// The targets of a face: its rectangle, halved until each part fits a view and is filled, without obstacles.
-fn targets_of<'a>(face: &Face<'a>, scene: &Scene, coarser: f64, params: &ViewParams) -> Vec<Target<'a>> {
+fn targets_of<'a>(face: &Face<'a>, scene: &Scene, pixels: &Pixels, params: &ViewParams) -> Vec<Target<'a>> {
     let axes = face.frame.face_from_world();
     let mut targets = Vec::new();
     let mut left = vec![face.cells.clone()];
@@ -196,7 +239,7 @@ fn targets_of<'a>(face: &Face<'a>, scene: &Scene, coarser: f64, params: &ViewPar
         });
         let size_m = bounds.map(|[low, high]| high - low);
         let spacing_m = median(cells.iter().map(|c| c.spacing_m).collect());
-        let pixel_m = coarser * params.pixel_m.max(PIXEL * spacing_m);
+        let pixel_m = pixels.size_m(spacing_m);
         let longest = usize::from(size_m[1] > size_m[0]);
         let filled = cells.len() as f64 * params.cell_m * params.cell_m / (size_m[0] * size_m[1]);
         let is_scattered = filled < LEAST_FILLED && size_m[longest] > SMALL_CELLS * params.cell_m;
@@ -307,7 +350,7 @@ mod tests {
     #[test]
     fn every_place_is_seen_well_from_three_directions() {
         let (cells, params) = (round_wall(), ViewParams::default());
-        let planned = plan_views(&cells, &params);
+        let planned = plan_views(&cells, &params, None);
         let views: Vec<&View> = planned.iter().map(|p| &p.view).collect();
         assert_eq!(views[3].name, "view_004.png");
         // Points 8 mm apart are drawn in pixels of 4.8 mm.
@@ -355,20 +398,31 @@ mod tests {
     }
 
     #[test]
-    fn pixels_grow_until_all_views_fit() {
-        let (cells, params) = (
-            round_wall(),
-            ViewParams {
-                megapixels: 2.0,
-                ..ViewParams::default()
-            },
-        );
-        let views = plan_views(&cells, &params);
-        let pixels: u64 = views
-            .iter()
-            .map(|v| u64::from(v.view.camera.width) * u64::from(v.view.camera.height))
-            .sum();
-        assert!(!views.is_empty() && pixels < 2_100_000, "{pixels}");
-        assert!(plan_views(&[], &params).is_empty());
+    fn pixels_grow_until_all_views_fit_or_stones_are_small() {
+        let params = ViewParams {
+            megapixels: 2.0,
+            ..ViewParams::default()
+        };
+        let cells = round_wall();
+        let plan = |stone_m| plan_views(&cells, &params, stone_m);
+        let largest_m = |views: &[PlannedView]| views.iter().map(|v| v.pixel_m).fold(0.0, f64::max);
+        let finest = plan(None);
+        assert!(megapixels_of(&finest) > 20.0 && (largest_m(&finest) - 0.0048).abs() < 1e-12);
+        // Fifty pixels across stones of 35 cm, and across stones of two metres.
+        let small = plan(Some(0.35));
+        assert!((largest_m(&small) - 0.007).abs() < 1e-12);
+        assert!(megapixels_of(&small) < 0.6 * megapixels_of(&finest));
+        assert!(megapixels_of(&plan(Some(2.0))) < 2.1);
+        // Pixels are never finer than the points allow. `most_megapixels` enlarges them whatever the size of the stones.
+        assert!((largest_m(&plan(Some(0.1))) - 0.0048).abs() < 1e-12);
+        let params = ViewParams {
+            most_megapixels: 2.0,
+            ..params
+        };
+        for stone_m in [None, Some(0.35)] {
+            let views = plan_views(&cells, &params, stone_m);
+            assert!(!views.is_empty() && megapixels_of(&views) < 2.1);
+        }
+        assert!(plan_views(&[], &params, None).is_empty());
     }
 }

@@ -87,11 +87,7 @@ fn time(project: &Project, points: u64, photos: &[[u32; 2]], tile: f64) -> Strin
         .map(|[width, height]| tiling.tile_count(*width, *height))
         .sum();
     let seconds = tile * (per_point / SECONDS_PER_TILE * points as f64 + tiles as f64) / cores as f64;
-    let has_views = project
-        .epochs
-        .iter()
-        .any(|e| e.masks.is_none() && e.photos.is_none());
-    let views = match has_views {
+    let views = match project.epochs.ids().any(|e| project.has_views(e)) {
         true => ", plus the search for stones in views of the clouds",
         false => "",
     };

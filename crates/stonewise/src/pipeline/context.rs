@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use stonewise_core::progress::Progress;
+use stonewise_segment::Weights;
 
 /// Where a step notes its warnings.
 const WARNINGS: &str = "warnings.json";
@@ -168,6 +169,14 @@ impl<'a> Context<'a> {
     /// Digest of an input file or folder, read once.
     pub fn digest(&self, path: &Path) -> Result<String> {
         self.store.digest(path)
+    }
+
+    /// Digest of the weights of a detector.
+    pub fn weights_digest(&self, weights: &Weights) -> Result<String> {
+        match weights {
+            Weights::BuiltIn => Ok(blake3::hash(&weights.bytes()?).to_hex().to_string()),
+            Weights::File(path) => self.digest(path),
+        }
     }
 
     /// Times of all steps so far, in order.

@@ -60,10 +60,9 @@ impl<'a> Sizes<'a> {
             let views = epoch.read_cameras()?.views.into_iter();
             let sizes = views.map(|v| u64::from(v.camera.width) * u64::from(v.camera.height));
             let side = u64::from(project.settings.views.side_px);
-            pixels.push(match epoch.photos {
-                Some(_) => sizes.max().unwrap_or(0),
-                None => side * side,
-            });
+            let has_views = epoch.photos.is_none() || project.settings.views.beside_photos;
+            let views = has_views.then_some(side * side);
+            pixels.push(sizes.chain(views).max().unwrap_or(0));
         }
         Ok(Self {
             project,

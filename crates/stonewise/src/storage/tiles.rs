@@ -2,7 +2,7 @@
 //!
 //! Each tile is a Parquet file of x, y, z (f32 offsets from the tile's origin, metres), file (which of the
 //! epoch's clouds), index (which record of it), source (which entry of `sources.json`) and time (seconds
-//! since that source's first point). Tiles of an epoch without photos have red, green, blue and intensity,
+//! since that source's first point). Tiles of an epoch with views have red, green, blue and intensity,
 //! too. `tiles.json` lists origins, bounds and counts.
 
 use crate::error::{Error, Result};

@@ -21,6 +21,7 @@ pub(super) fn example(context: &Context, origin: &str) -> Result<Option<Example>
     let chosen = segmented
         .photos
         .iter()
+        .take(segmented.shown_count())
         .enumerate()
         .max_by_key(|(i, p)| (p.instances.len(), usize::MAX - i));
     let Some((index, photo)) = chosen else {

@@ -95,7 +95,7 @@ fn epoch_record(run: &Run, id: EpochId) -> Result<EpochRecord> {
         images: epoch.photos.as_ref().map(|p| p.images.clone()),
         motion: epoch.motion.clone(),
         points: labelled.ingested.tiles.surveyed.point_count(),
-        photos: photos.photos.len(),
+        photos: photos.shown_count(),
         stones: labelled.stones.len(),
     })
 }

@@ -66,9 +66,9 @@ fn ingest(context: &Context, id: EpochId) -> Result<Ingested> {
     let inputs: Vec<&str> = digests.iter().map(String::as_str).collect();
     let size_m = context.project.settings.ingest.size_m;
     let part = &context.project.part;
-    let keeps = match epoch.photos {
-        Some(_) => Keeps::Places,
-        None => Keeps::Values,
+    let keeps = match context.project.has_views(id) {
+        true => Keeps::Values,
+        false => Keeps::Places,
     };
     let key = Key::new(
         "ingest",

@@ -74,19 +74,19 @@ pub fn write_epoch_crops(
     } = epoch;
     let motion = labelled.ingested.tiles.motion.as_ref();
     let instances = instances_by_stone(labelled, windows, rows);
+    let views = &photos.views[..photos.shown_count()];
     let jobs: Vec<Job> = windows
         .iter()
-        .filter_map(|w| job(w, instances.get(&w.stone_id), &photos.views, motion))
+        .filter_map(|w| job(w, instances.get(&w.stone_id), views, motion))
         .collect();
-    let natural = |j: &Job| natural_px(j.window, &photos.views[j.photo], motion);
+    let natural = |j: &Job| natural_px(j.window, &views[j.photo], motion);
     let mut wanted: Vec<f64> = jobs.iter().map(natural).collect();
     let side_px = crop_side_px(jobs.len(), upper_median(&mut wanted).unwrap_or(0.0));
-    let mut by_photo: BTreeMap<usize, Vec<&Job>> =
-        (0..photos.photos.len()).map(|p| (p, Vec::new())).collect();
+    let mut by_photo: BTreeMap<usize, Vec<&Job>> = (0..views.len()).map(|p| (p, Vec::new())).collect();
     for job in &jobs {
         by_photo.entry(job.photo).or_default().push(job);
     }
-    assign_photos(points, &photos.views, labelled);
+    assign_photos(points, views, labelled);
     context.progress.begin("photo crops", by_photo.len() as u64);
     let cut = by_photo
         .into_par_iter()
@@ -287,7 +287,16 @@ fn assign_photos(points: &mut [Candidate], views: &[View], labelled: &Labelled) 
         .transfer
         .stones
         .iter()
-        .map(|s| (s.stone.0, s.instances.iter().map(|(p, _)| p.0 as usize).collect()))
+        .map(|s| {
+            (
+                s.stone.0,
+                s.instances
+                    .iter()
+                    .map(|(p, _)| p.0 as usize)
+                    .filter(|p| *p < views.len())
+                    .collect(),
+            )
+        })
         .collect();
     points.par_iter_mut().for_each(|candidate| {
         let own = voting.get(&candidate.point.stone);

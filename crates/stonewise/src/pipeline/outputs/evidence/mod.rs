@@ -48,7 +48,8 @@ fn write_evidence(run: &Run) -> Result<()> {
             true => None,
             false => Some(run.measured(epoch)?),
         };
-        let posed: Vec<PosedPhoto> = photos.views.iter().map(PosedPhoto::of).collect();
+        let shown = &photos.views[..photos.shown_count()];
+        let posed: Vec<PosedPhoto> = shown.iter().map(PosedPhoto::of).collect();
         write_cameras(out, epoch.number(), &posed)?;
         let mut points = thin_cloud(context, &labelled)?;
         let shown = ShownEpoch {

@@ -65,7 +65,7 @@ pub(super) fn photo_places(
         let boxes: Vec<_> = boxed.iter().map(|(_, e)| e.shape()).collect();
         let segment = (!boxes.is_empty()).then_some(&context.project.settings.segment);
         let weights = match segment.map(|s| Weights::named(&s.model)) {
-            Some(weights) => blake3::hash(&weights.bytes()?).to_hex().to_string(),
+            Some(weights) => context.weights_digest(&weights)?,
             None => String::new(),
         };
         let inputs = [labelled.key.as_str(), weights.as_str()];
@@ -127,7 +127,7 @@ fn nowhere(pixel: [f64; 2], what: &str) -> NoEffect {
     NoEffect::NoPlace(format!("pixel ({:.1}, {:.1}) {what}", pixel[0], pixel[1]))
 }
 
-/// The photo of an edit.
+/// The photo of an edit; a view only where no photo has this name.
 fn view_of<'a>(edit: &Edit, photos: &'a Segmented) -> std::result::Result<&'a View, NoEffect> {
     let names: Vec<Vec<String>> = photos
         .views
@@ -135,7 +135,10 @@ fn view_of<'a>(edit: &Edit, photos: &'a Segmented) -> std::result::Result<&'a Vi
         .zip(&photos.photos)
         .map(|(view, photo)| vec![view.name.clone(), photo.path.to_string_lossy().into_owned()])
         .collect();
-    let index = photo_named(edit.photo.as_deref().unwrap_or_default(), &names).map_err(NoEffect::NoPlace)?;
+    let name = edit.photo.as_deref().unwrap_or_default();
+    let index = photo_named(name, &names[..photos.photo_count().min(names.len())])
+        .or_else(|_| photo_named(name, &names))
+        .map_err(NoEffect::NoPlace)?;
     Ok(&photos.views[index])
 }
 

@@ -153,7 +153,8 @@ fn key(
     let mut inputs = Vec::from(labelled.map(|l| l.key.as_str().to_owned()).into_array());
     if tracks_photos(project, epochs) {
         for epoch in epochs.into_array() {
-            for photo in &run.posed(epoch)?.photos {
+            let posed = run.posed(epoch)?;
+            for photo in &posed.photos[..posed.photo_count()] {
                 inputs.push(run.context.digest(&photo.path)?);
             }
         }

@@ -70,7 +70,7 @@ impl DiskPhotos {
         warnings: &Warnings,
     ) -> Result<Option<Self>> {
         let mut params = context.project.settings.registration.photos.clone();
-        if photos.into_iter().any(|p| p.views.len() < params.min_photos) {
+        if photos.into_iter().any(|p| p.photo_count() < params.min_photos) {
             return Ok(None);
         }
         if params.rolling_shutter.is_none() {
@@ -80,7 +80,9 @@ impl DiskPhotos {
         let mut list = Vec::new();
         let mut paths = Vec::new();
         for (epoch, (segmented, labelled)) in photos.zip(labelled).into_iter().enumerate() {
-            for (view, photo) in segmented.views.iter().zip(&segmented.photos) {
+            // Views show nothing that the clouds do not contain.
+            let count = segmented.photo_count();
+            for (view, photo) in segmented.views.iter().zip(&segmented.photos).take(count) {
                 list.push(Photo {
                     name: photo.camera.clone(),
                     epoch,

@@ -7,7 +7,7 @@ use crate::pipeline::context::Context;
 use crate::pipeline::graph::Run;
 use crate::pipeline::part::Part;
 use crate::pipeline::steps::ingest::Ingested;
-use crate::pipeline::steps::views::has_no_photos;
+use crate::pipeline::steps::views::{drop_empty, has_no_photos};
 use crate::project::Epoch;
 use crate::storage::step::{Key, StepDir};
 use crate::texts::Said;
@@ -15,12 +15,10 @@ use crate::texts::notices::PHOTO_SIZE;
 use crate::warnings::Warnings;
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::PathBuf;
 use std::sync::Arc;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::View;
-use stonewise_core::raster::RgbImage;
 use stonewise_core::transfer::photo_relief;
 use stonewise_io::image_io::read_rgb;
 use stonewise_io::masks::write_label_png;
@@ -32,12 +30,14 @@ const PHOTO: &str = "photo.json";
 /// Its label image.
 const LABELS: &str = "labels.png";
 
-/// The step of one epoch: every posed photo is a part of it.
+/// The step of one epoch: every posed photo and view is a part of it.
 pub struct Detection<'a> {
     context: &'a Context<'a>,
     /// With photos, or with views in their place.
-    epoch: Arc<Epoch>,
+    epoch: Epoch,
     is_of_views: bool,
+    /// With views in place of its photos, where the detector looks at both.
+    with_views: Option<Epoch>,
     name: String,
     key: Key,
     weights: Weights,
@@ -45,6 +45,13 @@ pub struct Detection<'a> {
     ingested: Option<Arc<Ingested>>,
     /// Opened for the first photo that needs it.
     detector: OnceCell<StoneFinder>,
+}
+
+/// A photo or a view in which stones are looked for.
+struct Candidate {
+    view: View,
+    path: PathBuf,
+    is_view: bool,
 }
 
 /// What became of a photo.
@@ -63,24 +70,19 @@ impl<'a> Detection<'a> {
         let epoch = run.pictured(id)?;
         let params = &context.project.settings.segment;
         let weights = Weights::named(&params.model);
-        let digest = match &weights {
-            Weights::BuiltIn => blake3::hash(
-                &weights
-                    .bytes()
-                    .map_err(|error| no_masks(context, &epoch, &error))?,
-            )
-            .to_hex()
-            .to_string(),
-            Weights::File(path) => context.digest(path)?,
-        };
-
+        let digest = context.weights_digest(&weights)?;
         let ingested = match weights.takes_relief() {
             Ok(true) => Some(run.ingested(id)?),
             // An error is reported where the detector is opened.
             Ok(false) | Err(_) => None,
         };
         let mut digests = vec![digest];
-        if let Some(files) = &epoch.photos {
+        let with_views = run.beside_photos(id)?;
+        for files in [Some(&epoch), with_views.as_ref()]
+            .into_iter()
+            .flatten()
+            .flat_map(|e| &e.photos)
+        {
             digests.extend([context.digest(&files.cameras)?, context.digest(&files.images)?]);
         }
         digests.extend(ingested.as_ref().map(|i| i.step.key().as_str().to_owned()));
@@ -90,6 +92,7 @@ impl<'a> Detection<'a> {
             context,
             epoch,
             is_of_views: has_no_photos(context.project, id),
+            with_views,
             name: format!("{STEP}-{id}"),
             key: Key::new(STEP, &params.tiling, &digests),
             weights,
@@ -98,7 +101,7 @@ impl<'a> Detection<'a> {
         })
     }
 
-    /// Finds the stones of every posed photo; photos that are done already are taken over.
+    /// Finds the stones of every posed photo and view; those that are done already are taken over.
     pub fn all(&self) -> Result<StepDir> {
         let done = self
             .context
@@ -112,17 +115,29 @@ impl<'a> Detection<'a> {
 
     /// Finds the stones of one posed photo, counted from 0.
     pub fn photo(&self, number: usize) -> Result<()> {
-        let candidates = posed_photos(&self.epoch, &Warnings::default())?;
-        let Some((view, path)) = candidates.get(number) else {
+        let candidates = self.candidates(&Warnings::default())?;
+        let Some(candidate) = candidates.get(number) else {
             return Err(Error::Survey(format!(
                 "epoch {:?} has {} posed photos",
                 self.epoch.name,
                 candidates.len()
             )));
         };
-        let tiles = self.tiles(view);
-        self.context.progress.begin("tiles", tiles);
-        self.part(number, view, path).map(|_| ())
+        self.context.progress.begin("tiles", self.tiles(&candidate.view));
+        self.part(number, candidate).map(|_| ())
+    }
+
+    /// Posed photos, then views.
+    fn candidates(&self, warnings: &Warnings) -> Result<Vec<Candidate>> {
+        let photos = posed_photos(&self.epoch, warnings)?;
+        let views = match &self.with_views {
+            Some(epoch) => posed_photos(epoch, warnings)?,
+            None => Vec::new(),
+        };
+        let candidate =
+            |is_view: bool| move |(view, path): (View, PathBuf)| Candidate { view, path, is_view };
+        let photos = photos.into_iter().map(candidate(self.is_of_views));
+        Ok(photos.chain(views.into_iter().map(candidate(true))).collect())
     }
 
     fn tiles(&self, view: &View) -> u64 {
@@ -131,16 +146,17 @@ impl<'a> Detection<'a> {
     }
 
     fn gather(&self, step: &StepDir, warnings: &Warnings) -> Result<Vec<VotingPhoto>> {
-        let candidates = posed_photos(&self.epoch, warnings)?;
-        let total = candidates.iter().map(|(view, _)| self.tiles(view)).sum();
+        let candidates = self.candidates(warnings)?;
+        let total = candidates.iter().map(|c| self.tiles(&c.view)).sum();
         self.context.progress.begin("tiles", total);
         let mut photos: Vec<VotingPhoto> = Vec::new();
         let count = candidates.len();
-        for (number, (view, path)) in candidates.into_iter().enumerate() {
+        for (number, candidate) in candidates.into_iter().enumerate() {
             self.context
                 .progress
                 .detail(&format!("picture {} of {count}", number + 1));
-            let part = self.part(number, &view, &path)?;
+            let part = self.part(number, &candidate)?;
+            let Candidate { view, path, is_view } = candidate;
             let outcome: Outcome = read_json(&part.file(PHOTO))?;
             if let Some(reason) = outcome.reason {
                 warnings.skipped(STEP, path.to_string_lossy(), reason);
@@ -152,6 +168,7 @@ impl<'a> Detection<'a> {
             photos.push(VotingPhoto {
                 camera: view.name,
                 path,
+                is_view,
                 instances,
             });
         }
@@ -159,23 +176,24 @@ impl<'a> Detection<'a> {
         Ok(photos)
     }
 
-    fn part(&self, number: usize, view: &View, path: &Path) -> Result<StepDir> {
+    fn part(&self, number: usize, candidate: &Candidate) -> Result<StepDir> {
         let mut is_made = false;
         let part = self
             .context
             .part((&self.name, &self.key), &Part::Photo(number).name(), |part| {
                 is_made = true;
-                let outcome = self.find(part, view, path)?;
+                let outcome = self.find(part, candidate)?;
                 write_json(&part.file(PHOTO), &outcome)
             })?;
         if !is_made {
-            self.context.progress.advance(self.tiles(view));
+            self.context.progress.advance(self.tiles(&candidate.view));
         }
         Ok(part)
     }
 
-    fn find(&self, part: &StepDir, view: &View, path: &Path) -> Result<Outcome> {
+    fn find(&self, part: &StepDir, candidate: &Candidate) -> Result<Outcome> {
         let progress = self.context.progress;
+        let Candidate { view, path, is_view } = candidate;
         let image = match read_rgb(path) {
             Ok(image) => image,
             Err(error) => {
@@ -209,7 +227,7 @@ impl<'a> Detection<'a> {
             None => None,
         };
         let mut stones = segment_photo(self.detector()?, &image, relief.as_ref(), tiling, progress)?;
-        if self.is_of_views {
+        if *is_view {
             drop_empty(&mut stones, &image);
         }
         write_label_png(&part.file(LABELS), &stones.labels)?;
@@ -239,33 +257,6 @@ impl Outcome {
     }
 }
 
-fn no_masks(context: &Context, epoch: &Epoch, error: &impl std::fmt::Display) -> Error {
-    Error::Survey(format!(
-        "epoch {:?} has no masks, and no detector can find its stones ({error}): add `masks = ...` (COCO json or a folder of \
-         16-bit label PNGs) to the epoch, or `model = ...` to [segment], in {}",
-        epoch.name,
-        context.project.path.display()
-    ))
-}
-
-/// Takes away what a view does not show, such as level ground, which is black: the detector sees its relief all the
-/// same. An instance of which most goes is no stone.
-fn drop_empty(stones: &mut Segmentation, view: &RgbImage) {
-    let is_empty = |pixel: &[u8; 3]| *pixel == [0; 3];
-    let mut counts: BTreeMap<u32, [usize; 2]> = BTreeMap::new();
-    for (id, pixel) in stones.labels.data().iter().zip(view.data()) {
-        counts.entry(*id).or_default()[usize::from(is_empty(pixel))] += 1;
-    }
-    stones
-        .scores
-        .retain(|id, _| counts.get(id).is_some_and(|[shown, empty]| shown >= empty));
-    for (id, pixel) in stones.labels.data_mut().iter_mut().zip(view.data()) {
-        if is_empty(pixel) || !stones.scores.contains_key(id) {
-            *id = 0;
-        }
-    }
-}
-
 fn instances(stones: &Segmentation) -> Vec<Instance> {
     let instance = |(&id, &score): (&u32, &f32)| Instance {
         id,
@@ -273,23 +264,4 @@ fn instances(stones: &Segmentation) -> Vec<Instance> {
         stone_ref: None,
     };
     stones.scores.iter().map(instance).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use stonewise_core::raster::Raster;
-
-    #[test]
-    fn what_a_view_leaves_black_is_no_stone() {
-        // A stone on the wall, one that reaches over its foot, and one on the ground.
-        let mut stones = Segmentation {
-            labels: Raster::from_vec(4, 3, vec![1, 1, 2, 2, 1, 1, 2, 0, 3, 3, 2, 0]).unwrap(),
-            scores: [1, 2, 3].map(|id| (id, 0.9)).into(),
-        };
-        let view = (0..12).map(|at| if at < 8 { [90; 3] } else { [0; 3] }).collect();
-        drop_empty(&mut stones, &Raster::from_vec(4, 3, view).unwrap());
-        assert_eq!(stones.labels.data(), [1, 1, 2, 2, 1, 1, 2, 0, 0, 0, 0, 0]);
-        assert_eq!(stones.scores.into_keys().collect::<Vec<u32>>(), [1, 2]);
-    }
 }

@@ -55,6 +55,7 @@ pub fn write_labels(
         photos.push(VotingPhoto {
             camera: view.name,
             path,
+            is_view: false,
             instances,
         });
     }

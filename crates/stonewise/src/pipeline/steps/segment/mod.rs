@@ -10,7 +10,7 @@ use crate::pipeline::cost::{Cost, Sizes};
 use crate::pipeline::graph::{About, Need, PartKind, Parts, Run, Step};
 use crate::pipeline::part::Part;
 use crate::pipeline::steps::ingest::INGEST;
-use crate::pipeline::steps::views::{VIEWS, has_no_photos};
+use crate::pipeline::steps::views::VIEWS;
 use crate::project::{Epoch, Project};
 use crate::storage::step::{Key, StepDir};
 use crate::warnings::Warnings;
@@ -34,7 +34,7 @@ pub static SEGMENT: Step = Step {
     words: |_| "stones in the pictures of",
     about: About::Epoch,
     needs: &[
-        Need::same(&VIEWS).when(has_no_photos),
+        Need::same(&VIEWS).when(Project::has_views),
         // A detector that takes relief looks at the clouds, too.
         Need::same(&INGEST).when(takes_relief),
     ],
@@ -85,13 +85,26 @@ impl Run<'_> {
 pub struct Segmented {
     /// Where the label images lie, and the key they were made under.
     pub step: StepDir,
-    /// Photos in the order of the views.
+    /// Photos, then views of the clouds.
     pub photos: Vec<VotingPhoto>,
-    /// Their cameras; image ids are indices.
+    /// Their cameras, in the same order; image ids are indices.
     pub views: Vec<View>,
 }
 
 impl Segmented {
+    /// Number of photos, which come before views.
+    pub fn photo_count(&self) -> usize {
+        self.photos.iter().take_while(|photo| !photo.is_view).count()
+    }
+
+    /// Number of pictures that results show: of photos, or of views where there are only views.
+    pub fn shown_count(&self) -> usize {
+        match self.photo_count() {
+            0 => self.photos.len(),
+            count => count,
+        }
+    }
+
     /// The label image of a photo.
     pub fn labels(&self, image: ImageId) -> Result<LabelImage> {
         Ok(read_label_png(&label_path(&self.step, image.0 as usize))?)
@@ -100,7 +113,7 @@ impl Segmented {
 
 fn segment(run: &Run, id: EpochId) -> Result<Segmented> {
     let context = run.context;
-    let epoch = &*run.pictured(id)?;
+    let epoch = &run.pictured(id)?;
     let step = match (&epoch.masks, &epoch.photos) {
         (None, _) | (_, None) => Detection::new(run, id)?.all()?,
         (Some(masks), Some(files)) => {
@@ -117,9 +130,18 @@ fn segment(run: &Run, id: EpochId) -> Result<Segmented> {
         }
     };
     let photos: Vec<VotingPhoto> = read_json(&step.file(PHOTOS))?;
-    let cameras = epoch.read_cameras()?;
+    let mut cameras = epoch.read_cameras()?.views;
+    if let Some(with_views) = run.beside_photos(id)? {
+        cameras.extend(with_views.read_cameras()?.views);
+    }
     let views = photos.iter().enumerate().filter_map(|(i, photo)| {
-        let view = cameras.views.iter().find(|v| v.name == photo.camera)?;
+        let mut named = cameras.iter().filter(|v| v.name == photo.camera);
+        // A photo may have the name of a view; views come last.
+        let view = if photo.is_view {
+            named.next_back()
+        } else {
+            named.next()
+        }?;
         Some(View {
             image: ImageId(i as u32),
             ..view.clone()

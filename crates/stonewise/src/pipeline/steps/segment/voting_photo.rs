@@ -24,6 +24,8 @@ pub struct VotingPhoto {
     pub camera: String,
     /// The photo.
     pub path: PathBuf,
+    /// Whether it is a view of the clouds.
+    pub is_view: bool,
     /// Its instances, as the masks name them.
     pub instances: Vec<Instance>,
 }
