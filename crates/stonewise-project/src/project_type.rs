@@ -144,8 +144,8 @@ impl Project {
         !epoch.is_reference() && self.settings.registration.align == Align::Stones
     }
 
-    /// Whether the detector looks at views of the clouds of an epoch: in place of photos, or beside them where the
-    /// project asks for both.
+    /// Whether the detector looks at views of the clouds of an epoch: in place of photos, or beside them with
+    /// `beside_photos`.
     pub fn has_views(&self, epoch: EpochId) -> bool {
         let own = &self.epochs[epoch];
         own.photos.is_none() || self.settings.views.beside_photos && own.masks.is_none()

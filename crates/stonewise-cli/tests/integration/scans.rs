@@ -1,5 +1,6 @@
 //! Surveys without photos: two scans and one command.
 
+use crate::support::stones::{number, rows};
 use crate::support::{copy_of, outcome, stonewise, survey};
 use serde_json::Value;
 use std::fs;
@@ -84,19 +85,9 @@ fn views_beside_photos_show_stones_and_track_none() {
     assert_eq!(record["epochs"][0]["photos"], 2);
     let audit = fs::read_to_string(results.join("audit_epoch1.csv")).unwrap();
     assert!(audit.contains("view_001.png"), "{audit}");
-    let stones = fs::read_to_string(results.join("stones.csv")).unwrap();
-    let column = stones
-        .lines()
-        .next()
-        .unwrap()
-        .split(',')
-        .position(|c| c == "photos")
-        .unwrap();
-    let shown = stones
-        .lines()
-        .skip(1)
-        .map(|row| row.split(',').nth(column).unwrap().parse::<u32>().unwrap());
-    assert!(shown.max() > Some(2), "{stones}");
+    let stones = rows(&results.join("stones.csv"));
+    let shown = stones.values().map(|row| number(row, "photos"));
+    assert!(shown.fold(0.0, f64::max) > 2.0, "{stones:?}");
     let registration = json(&results.join("registration.json"));
     let tracked = registration["photos"]["poses_px"].as_array().unwrap();
     assert!(
@@ -141,14 +132,9 @@ fn pixels_of_views_fit_the_stones() {
     // Seen from 12 m where nothing hides the wall.
     let pixel_m = 12.0 / focal_px.fold(0.0, f64::max);
 
-    let truth = fs::read_to_string(survey().join("truth/stones.csv")).unwrap();
-    let mut rows = truth.lines().map(|row| row.split(',').collect::<Vec<_>>());
-    let head = rows.next().unwrap();
-    let column = |name: &str| head.iter().position(|c| *c == name).unwrap();
-    let (area, visible) = (column("area_m2"), column("vis_tls"));
-    let value = |row: &[&str], column: usize| row[column].parse::<f64>().unwrap();
-    let seen = rows.filter(|row| value(row, visible) > 0.35);
-    let mut sizes_m: Vec<f64> = seen.map(|row| value(&row, area).sqrt()).collect();
+    let truth = rows(&survey().join("truth/stones.csv"));
+    let seen = truth.values().filter(|row| number(row, "vis_tls") > 0.35);
+    let mut sizes_m: Vec<f64> = seen.map(|row| number(row, "area_m2").sqrt()).collect();
     sizes_m.sort_by(f64::total_cmp);
     let across_px = sizes_m[sizes_m.len() / 4] / pixel_m;
     assert!(

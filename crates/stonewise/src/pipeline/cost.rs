@@ -54,14 +54,14 @@ impl<'a> Sizes<'a> {
     pub fn of(project: &'a Project) -> Result<Self> {
         let mut points = Vec::new();
         let mut pixels = Vec::new();
-        for epoch in &project.epochs {
+        for id in project.epochs.ids() {
+            let epoch = &project.epochs[id];
             let records = epoch.clouds.iter().map(|cloud| most_records(cloud));
             points.push(records.sum::<Result<u64>>()?);
             let views = epoch.read_cameras()?.views.into_iter();
             let sizes = views.map(|v| u64::from(v.camera.width) * u64::from(v.camera.height));
             let side = u64::from(project.settings.views.side_px);
-            let has_views = epoch.photos.is_none() || project.settings.views.beside_photos;
-            let views = has_views.then_some(side * side);
+            let views = project.has_views(id).then_some(side * side);
             pixels.push(sizes.chain(views).max().unwrap_or(0));
         }
         Ok(Self {

@@ -26,16 +26,12 @@ pub fn smaller_stones(drawing: &Drawing, planned: &[PlannedView]) -> Result<Opti
     let weights = Weights::named(&settings.segment.model);
     let finder = StoneFinder::open(&weights, tiling.min_score as f32)?;
     let takes_relief = weights.takes_relief()?;
-    let looked_at = spread(planned);
-    let tiles = looked_at.iter().map(|p| {
-        let camera = &p.view.camera;
-        tiling.tile_count(camera.width, camera.height)
-    });
-    let tiles = tiles.sum();
     let mut sizes_m: Vec<f64> = Vec::new();
 
-    for batch in batches(&looked_at) {
+    for batch in batches(&spread(planned)) {
         let images = drawing.images(batch)?;
+        let cameras = batch.iter().map(|planned| &planned.view.camera);
+        let tiles = cameras.map(|c| tiling.tile_count(c.width, c.height)).sum();
         progress.begin("a first look at the size of stones", tiles);
         for (planned, image) in batch.iter().zip(images) {
             let relief = takes_relief
