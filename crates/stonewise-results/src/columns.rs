@@ -58,7 +58,7 @@ pub static STONE_COLUMNS: &[StoneColumn] = &[
     column!(Real "area_m2", "m2", "area of the visible face in the first epoch", area_m2),
     column!(Count "points_1", "", "points in the first epoch", points_1),
     column!(OptionalCount "points_2", "", "points in the later epoch; empty without a partner", points_2),
-    column!(Count "photos", "", "photos of the first epoch that show the stone", photos),
+    column!(Count "photos", "", "photos and views of the first epoch that show the stone", photos),
     column!(Real "confidence", "", "mean share of the photos' votes that its points gave the stone, 0 to 1", confidence),
     column!(OptionalCount "matched_id", "", "partner in the later epoch, or empty", matched_id),
     column!(Status "status", "", "ok, or why there is no motion", status),
