@@ -8,7 +8,8 @@
 
 Simulates walls of 3 x 2 m with `stonewise simulate`, edits the clouds (ivy, snow, a buttress,
 coarser coordinates ...), runs stonewise and prints a row of a Markdown table for each survey.
-Surveys named s_* are scans alone, those named m_* have two photos an epoch with true masks.
+Surveys named s_* are scans alone, those named m_* have two photos an epoch with the masks of the
+wall before the edits.
 
 Lengths are metres in the frame of the simulator: x out of the wall, y along it, z up, the foot of
 the face at x = 0. What is printed is in millimetres. RMSE is of the length of the error (all three
@@ -252,6 +253,31 @@ def repairs(scene):
         cover((y, y + 0.35), (z, z + 0.35), 0.008, 40000)(scene)
 
 
+def wet(scene):
+    """Water has run down the wall in six streaks in the second epoch."""
+    cloud, random = scene.clouds[1], scene.random
+    wall = scene.on_wall(cloud)
+    for _ in range(6):
+        y, width, low = random.uniform(-1.5, 1.4), random.uniform(0.1, 0.25), random.uniform(0, 1.2)
+        cloud.intensity[wall & within(cloud.places, (y, y + width), (low, 3.0))] *= 0.4
+
+
+def shadow(scene):
+    """An oblique strip of the wall is darker in the second epoch, as the shadow of a crane's jib."""
+    cloud = scene.clouds[1]
+    y, z = cloud.places[:, 1:].T
+    cloud.intensity[scene.on_wall(cloud) & (abs(y - 0.5 * z) < 0.15)] *= 0.5
+
+
+def ladder(scene):
+    """A ladder stands against the wall in the second epoch."""
+    for low in np.arange(0.0, 2.1, 0.3):
+        out = scene.face(np.array([[0.0, 0.0, low]]))[0] + 0.06
+        for y in (-0.5, -0.1):
+            thing((out, y, low), (out + 0.06, y + 0.05, low + 0.3))(scene)
+        thing((out, -0.45, low + 0.27), (out + 0.04, -0.1, low + 0.3))(scene)
+
+
 def snow(scene):
     """A drift of 12 cm on the ground and at the foot of the wall in the second epoch."""
     cloud = scene.clouds[1]
@@ -294,9 +320,15 @@ def recess(shift):
     return block((-0.5, 0.4), (-0.1, 1.5), -0.3, (shift, 0.0, 0.0))
 
 
-def buttress(centimetres):
-    """A buttress of this depth, which moves out by 4 mm."""
-    return block((-0.45, 0.45), (-0.1, 3.0), centimetres / 100, (0.004, 0.0, 0.0))
+def buttress(centimetres, shift=0.004):
+    """A buttress of this depth, which moves out by the shift."""
+    return block((-0.45, 0.45), (-0.1, 3.0), centimetres / 100, (shift, 0.0, 0.0))
+
+
+def steps(shift):
+    """The risers of three steps at the foot of the wall, which move out by the shift."""
+    courses = [(0.75, (-0.1, 0.25)), (0.5, (0.25, 0.5)), (0.25, (0.5, 0.75))]
+    return [block((-0.6, 0.6), up, out, (shift, 0.0, 0.0)) for out, up in courses]
 
 
 def two_buttresses(centimetres):
@@ -341,6 +373,7 @@ def half(scene):
 
 CAR = thing((0.6, -0.9, 0.0), (1.6, 0.2, 0.9))
 PERSON = thing((0.5, -0.6, 0.0), (0.8, -0.2, 1.7), epochs=(0, 1), shift=(0.0, 0.25, 0.0))
+POLE = thing((0.25, -0.3, 0.0), (0.3, -0.25, 2.4))
 HUT = thing((0.5, -0.9, 0.0), (1.3, -0.1, 0.9), epochs=(0, 1), shift=(0.02, 0.03, 0.0))
 FAR_HUT = thing((0.9, -0.9, 0.0), (1.6, -0.1, 0.9), epochs=(0, 1), shift=(0.004, 0.0, 0.0))
 IVY = {"along": (-1.6, -0.5), "up": (0, 2.1), "off": 0.01, "intensity": 12000, "scatter": 0.03}
@@ -525,15 +558,34 @@ SURVEYS = [
     Survey("s_car", 36, edits=[CAR]),
     Survey("s_hut_moves", 88, edits=[HUT]),
     Survey("s_person", 37, edits=[PERSON]),
+    Survey("s_pole", 701, edits=[POLE]),
+    Survey("s_ladder", 702, edits=[ladder]),
     Survey("s_snow", 38, edits=[snow]),
     Survey("s_banner", 39, edits=[cover((-0.7, 0.3), (0.9, 1.5), 0.03, 45000)]),
     Survey("s_repairs", 97, edits=[repairs]),
+    Survey("s_wet", 703, edits=[wet]),
+    Survey("s_shadow", 704, edits=[shadow]),
     Survey("s_ivy", 40, edits=[cover(**IVY, share=0.8)]),
     Survey("s_ivy_thin", 94, edits=[cover(**IVY, share=0.4)]),
     Survey("m_ivy", 93, edits=[cover(**IVY, share=0.8)]),
     # Parts before or behind the face.
     Survey("s_recess", 42, edits=[recess(0.0)]),
     Survey("m_recess_moves", 62, edits=[recess(0.005)], expected="attention"),
+    *(
+        Survey(
+            f"m_island_{kind}_{round(1e3 * shift)}mm",
+            seed,
+            edits=edits,
+            expected="attention" if shift else "fine",
+            surroundings=BARE,
+        )
+        for shift in (0.0, 0.005, 0.05)
+        for kind, seed, edits in [
+            ("recess", 401, [recess(shift)]),
+            ("buttress", 501, [buttress(30, shift)]),
+            ("steps", 601, steps(shift)),
+        ]
+    ),
     *(
         Survey(
             f"s_two_buttresses_{centimetres}cm",
@@ -566,7 +618,7 @@ def main():
     if not chosen:
         sys.exit(f"panel.py: no survey is called {' or '.join(patterns)}; --list shows the names")
     if arguments.list:
-        print("\n".join(f"{survey.name:20} {survey.verdict}" for survey in chosen))
+        print("\n".join(f"{survey.name:22} {survey.verdict}" for survey in chosen))
         return
     if not laspy.LazBackend.detect_available():
         sys.exit("panel.py: laspy cannot read LAZ; install lazrs with: pip install laspy[lazrs]")

@@ -173,10 +173,7 @@ impl<'a> Context<'a> {
 
     /// Digest of the weights of a detector.
     pub fn weights_digest(&self, weights: &Weights) -> Result<String> {
-        match weights {
-            Weights::BuiltIn => Ok(blake3::hash(&weights.bytes()?).to_hex().to_string()),
-            Weights::File(path) => self.digest(path),
-        }
+        self.store.weights_digest(weights)
     }
 
     /// Times of all steps so far, in order.

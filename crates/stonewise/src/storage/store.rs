@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use stonewise_segment::Weights;
 
 /// How many versions of a step's files are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -288,6 +289,14 @@ impl StepStore {
         let digest = path_digest(path)?;
         known.insert(path.to_path_buf(), digest.clone());
         Ok(digest)
+    }
+
+    /// Digest of the weights of a detector.
+    pub fn weights_digest(&self, weights: &Weights) -> Result<String> {
+        match weights {
+            Weights::BuiltIn => Ok(blake3::hash(&weights.bytes()?).to_hex().to_string()),
+            Weights::File(path) => self.digest(path),
+        }
     }
 }
 

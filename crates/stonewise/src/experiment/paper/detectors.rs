@@ -128,10 +128,7 @@ impl DetectorTraining<'_> {
     }
 
     fn key(&self) -> Result<Key> {
-        let before = match Weights::named(&self.params.model) {
-            weights @ Weights::BuiltIn => blake3::hash(&weights.bytes()?).to_hex().to_string(),
-            Weights::File(path) => self.store.digest(&path)?,
-        };
+        let before = self.store.weights_digest(&Weights::named(&self.params.model))?;
         let mut digests = vec![
             self.store.digest(self.masks()?)?,
             self.store.digest(self.images()?)?,

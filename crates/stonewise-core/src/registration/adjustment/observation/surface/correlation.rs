@@ -61,9 +61,12 @@ impl Correlation {
 }
 
 /// Further factor on one stone's variances, at least 1.
-pub(crate) fn stone_factor(stone: &Equations, fitted: f64, survey: f64) -> f64 {
+///
+/// Only small cells are compared, with those of most stones: the survey's factor may be that of the larger ones.
+pub(crate) fn stone_factor(stone: &Equations, fitted: f64, survey: &Correlation) -> f64 {
     let cells = stone.differences.len() as f64;
-    let sum: f64 = stone.differences.iter().map(|d| (d / survey).min(CAP)).sum();
+    let ratios = stone.differences.iter().map(|d| (d / survey.small).min(CAP));
+    let sum: f64 = ratios.sum();
     ((PRIOR_CELLS + sum) / (PRIOR_CELLS + (cells - fitted).max(0.0))).max(1.0)
 }
 
@@ -181,15 +184,21 @@ mod tests {
     fn a_noisy_stone_gets_a_factor_of_its_own_and_a_quiet_one_none() {
         let noisy = &stones([6.0, 1.0], 4)[0];
         let quiet = &stones([0.5, 1.0], 5)[0];
-        let factor = stone_factor(noisy, 0.0, 2.0);
         let sum: f64 = noisy.differences.iter().map(|d| d / 2.0).sum();
-        assert!(
-            (factor - (PRIOR_CELLS + sum) / (PRIOR_CELLS + 40.0)).abs() < 1e-12,
-            "{factor}"
-        );
-        assert!(factor > 1.5);
-        assert_eq!(stone_factor(quiet, 0.0, 2.0), 1.0);
-        assert_eq!(stone_factor(&without_points(), 0.0, 2.0), 1.0);
+        // By how much larger cells differ, and with it the survey's factor, does not matter.
+        for large in [1.0, 2.0, 6.0] {
+            let survey = Correlation {
+                small: 2.0,
+                large,
+                slopes: 1.0,
+            };
+            let factor = stone_factor(noisy, 0.0, &survey);
+            let expected = (PRIOR_CELLS + sum) / (PRIOR_CELLS + 40.0);
+            assert!((factor - expected).abs() < 1e-12, "{factor} {expected}");
+            assert!(factor > 1.5);
+            assert_eq!(stone_factor(quiet, 0.0, &survey), 1.0);
+            assert_eq!(stone_factor(&without_points(), 0.0, &survey), 1.0);
+        }
     }
 
     #[test]

@@ -89,8 +89,8 @@ impl SurfaceModel {
 
     /// [`Inflation::all`] alone.
     pub fn inflation_of_all(&self, stone: StoneSurface) -> f64 {
-        let survey = self.correlation.factor();
-        survey * stone.at_better(|e| stone_factor(e, stone.effective_freedom, survey))
+        let survey = &self.correlation;
+        survey.factor() * stone.at_better(|e| stone_factor(e, stone.effective_freedom, survey))
     }
 
     /// Variances of errors that all points of a stone share, beyond what its own cells show: translation,
