@@ -1,5 +1,6 @@
-"""Writes crates/stonewise-io/src/crs/epsg.tsv.zz: all projected systems of the EPSG register that WKT 1 can express, and the
-geographic ones, as PROJ has them. Needs pyproj. From the root of the repository: python3 testdata/crs/epsg.py
+"""Writes crates/stonewise-io/src/crs/epsg.tsv.zz: all projected systems of the EPSG register that WKT 1 can express, the
+geographic and vertical ones, and what is compound of them, as PROJ has them. Needs pyproj. From the root of the repository:
+python3 testdata/crs/epsg.py
 
 Lines of cells between tabs, deflated (zlib). A cell is a number of an earlier line of its kind, counted from 0, where it
 names one:
@@ -8,6 +9,8 @@ names one:
     U  name, size in metres, order of the axes (EN, NE, or nothing where an axis points elsewhere, as about a pole)
     M  projection, names of its parameters
     P  code less that of the line before, name behind that of the geographic system, G, M, U, parameters
+    V  code less that of the line before, name, datum, unit (name, size in metres), direction (UP, DOWN)
+    C  code less that of the line before, name or nothing where it is made of those of the parts, codes of G or P and of V
 """
 
 import re
@@ -91,7 +94,7 @@ for code in codes(PJType.GEOGRAPHIC_2D_CRS):
     lines.append("\t".join(["G", *map(str, cells)]))
     last = code
 
-projected, last, skipped = [], 0, 0
+projected, map_names, last, skipped = [], {}, 0, 0
 for code in codes(PJType.PROJECTED_CRS):
     text = wkt1(code)
     crs = CRS.from_epsg(code)
@@ -104,6 +107,7 @@ for code in codes(PJType.PROJECTED_CRS):
     name, method, rest = found.groups()
     unit, size = re.search(rf"UNIT\[{QUOTED},{NUMBER}", rest).groups()
     parameters = re.findall(rf"PARAMETER\[{QUOTED},{NUMBER}\]", rest)
+    map_names[code] = name
     own = names[int(base[1])] + " / "
     name = "/" + name[len(own) :] if name.startswith(own) else name
     cells = [
@@ -117,9 +121,37 @@ for code in codes(PJType.PROJECTED_CRS):
     projected.append("\t".join(["P", *map(str, cells)]))
     last = code
 
-table = "\n".join(spheroids.lines() + lines + units.lines() + methods.lines() + projected) + "\n"
+vertical, verticals, last = [], {}, 0
+for code in codes(PJType.VERTICAL_CRS):
+    found = re.match(
+        rf"VERT_CS\[{QUOTED},VERT_DATUM\[{QUOTED}.*?UNIT\[{QUOTED},{NUMBER}.*?AXIS\[{QUOTED},(UP|DOWN)\]", wkt1(code)
+    )
+    if not found:
+        continue
+    name, datum, unit, size, _, direction = found.groups()
+    verticals[code] = name
+    vertical.append("\t".join(["V", str(code - last), name, datum, unit, number(size), direction]))
+    last = code
+
+horizontal = names | map_names
+compound, last = [], 0
+for code in codes(PJType.COMPOUND_CRS):
+    found = re.match(
+        rf'COMPD_CS\[{QUOTED},.*AUTHORITY\["EPSG","(\d+)"\]\],VERT_CS\[.*AUTHORITY\["EPSG","(\d+)"\]\],AUTHORITY', wkt1(code)
+    )
+    if not found or int(found[2]) not in horizontal or int(found[3]) not in verticals:
+        print("not compound of systems of the table:", code)
+        continue
+    name, flat, height = found[1], int(found[2]), int(found[3])
+    name = "" if name == f"{horizontal[flat]} + {verticals[height]}" else name
+    compound.append("\t".join(["C", str(code - last), name, str(flat), str(height)]))
+    last = code
+
+kinds = [spheroids.lines(), lines, units.lines(), methods.lines(), projected, vertical, compound]
+table = "\n".join(line for kind in kinds for line in kind) + "\n"
 packed = zlib.compress(table.encode(), 9)
 path = Path(__file__).parents[2] / "crates/stonewise-io/src/crs/epsg.tsv.zz"
 path.write_bytes(packed)
 print(f"PROJ {database.get_database_metadata('EPSG.VERSION')}: {len(geographic)} geographic systems, {len(projected)} projected, "
-      f"{skipped} left out, {len(methods.place)} methods; {len(table)} bytes, packed {len(packed)}")
+      f"{skipped} left out, {len(vertical)} vertical, {len(compound)} compound, {len(methods.place)} methods; "
+      f"{len(table)} bytes, packed {len(packed)}")

@@ -1,5 +1,5 @@
-"""Writes units.json: codes of the EPSG register whose first two axes are in feet, and all other projected and geographic ones up
-to 32767, as PROJ has them. Needs pyproj."""
+"""Writes units.json: codes of the EPSG register whose first two axes are in feet, and all other projected, geographic and compound
+ones up to 32767, as PROJ has them. Needs pyproj."""
 
 import json
 import pathlib
@@ -8,7 +8,7 @@ from pyproj import CRS
 from pyproj.database import query_crs_info
 from pyproj.enums import PJType
 
-KINDS = [PJType.PROJECTED_CRS, PJType.GEOGRAPHIC_2D_CRS, PJType.GEOGRAPHIC_3D_CRS]
+KINDS = [PJType.PROJECTED_CRS, PJType.GEOGRAPHIC_2D_CRS, PJType.GEOGRAPHIC_3D_CRS, PJType.COMPOUND_CRS]
 feet, other = [], []
 for info in query_crs_info("EPSG", KINDS, allow_deprecated=True):
     code = int(info.code)

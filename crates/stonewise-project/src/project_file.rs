@@ -136,13 +136,15 @@ struct RawHeader {
     /// Name of the epoch that motions count from. Absent: the first.
     #[schemars(with = "Option<String>")]
     reference: Option<Spanned<String>>,
-    /// Coordinate system of the clouds: a WKT, or a code such as `EPSG:25832`. Absent: what the clouds name.
+    /// Coordinate system of the clouds: a WKT, or a code such as `EPSG:25832` or `EPSG:25832+7837` (horizontal and
+    /// vertical system). Absent: what the clouds name.
     #[schemars(with = "Option<String>")]
     crs: Option<Spanned<String>>,
     /// Lengths that were taken off the clouds' coordinates, x, y, z, metres.
     #[serde(default)]
     false_origin: [f64; 3],
-    /// Grid of the geoid above which the heights of the clouds are, GTX. Absent: heights above the ellipsoid.
+    /// Grid of the geoid above which the heights of the clouds are: GTX, or GeoTIFF such as PROJ's. Absent: heights
+    /// above the ellipsoid.
     #[schemars(with = "Option<PathBuf>")]
     geoid: Option<Spanned<PathBuf>>,
 }

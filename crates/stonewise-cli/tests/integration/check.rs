@@ -78,7 +78,7 @@ type Case = (&'static str, fn(&Path), &'static str, bool);
 
 const CLOUD_2: &str = "epoch2/cloud_tls.laz";
 
-const CASES: [Case; 16] = [
+const CASES: [Case; 17] = [
     (
         "feet",
         |dir| map_cloud(&dir.join(CLOUD_2), |p| p / 0.3048),
@@ -104,6 +104,18 @@ const CASES: [Case; 16] = [
             }
         },
         "coordinate system is in feet",
+        true,
+    ),
+    (
+        "a system in degrees with heights, by its number alone",
+        |dir| {
+            for cloud in ["epoch1/cloud_tls.laz", CLOUD_2].map(|cloud| dir.join(cloud)) {
+                let points = points(&cloud);
+                fs::remove_file(&cloud).unwrap();
+                write_points_laz(&cloud, Some("EPSG:9518"), &points, &[]).unwrap();
+            }
+        },
+        "coordinate system is in degrees",
         true,
     ),
     (

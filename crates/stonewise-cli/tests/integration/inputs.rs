@@ -85,7 +85,7 @@ fn info_tells_what_pictures_and_masks_there_are() {
     ] {
         assert!(out.contains(expected), "{expected} is not in\n{out}");
     }
-    let (code, _, log) = info(&[testdata("hostile/../crs")]);
+    let (code, _, log) = info(&[testdata("coco_ap")]);
     assert_eq!(code, 1);
     assert!(
         log.contains("neither photos, label images nor a COLMAP model"),

@@ -23,7 +23,8 @@ pub struct MapFrame {
     pub crs: Option<String>,
     /// What was taken off the coordinates of the clouds, metres.
     pub false_origin: [f64; 3],
-    /// Grid of the geoid above which the heights of the clouds are (GTX); `None` for heights above the ellipsoid.
+    /// Grid of the geoid above which the heights of the clouds are, GTX or GeoTIFF; `None` for heights above the
+    /// ellipsoid.
     pub geoid: Option<PathBuf>,
 }
 
@@ -86,7 +87,7 @@ impl MapFrame {
                 let geoid = geoid.map_err(|error| error.to_string())?;
                 if let (Some(heights), None) = (&target.heights, &geoid) {
                     return Err(format!(
-                        "the heights of the clouds are above a geoid ({heights}): give its grid (GTX) as geoid under [project]"
+                        "the heights of the clouds are above a geoid ({heights}): give its grid (GTX or GeoTIFF) as geoid under [project]"
                     ));
                 }
                 Ok(Placing::Mapped(MapPlacing {

@@ -21,12 +21,16 @@ static TEXT: LazyLock<String> = LazyLock::new(|| {
 
 static REGISTER: LazyLock<Register> = LazyLock::new(|| Register::of(&TEXT));
 
-/// The definition of a system as WKT 1; `None` where the table does not have it.
-pub fn definition(code: u32) -> Option<String> {
-    match REGISTER.projected(code) {
-        Some(system) => Some(system.wkt()),
-        None => REGISTER.geographic(code).map(|system| system.wkt()),
+/// The definition of a system as WKT 1; `None` where the table does not have it. `codes`: its code, or those of a
+/// horizontal and a vertical system with a plus between them (`25832+7837`).
+pub fn definition(codes: &str) -> Option<String> {
+    let code = |text: &str| text.trim().parse().ok();
+    if let Some((horizontal, vertical)) = codes.split_once('+') {
+        return Some(REGISTER.joined(code(horizontal)?, code(vertical)?)?.wkt());
     }
+    let code = code(codes)?;
+    let horizontal = || REGISTER.horizontal(code).map(|(_, wkt)| wkt);
+    horizontal().or_else(|| Some(REGISTER.compound(code)?.wkt()))
 }
 
 /// A projected system.
@@ -34,9 +38,15 @@ pub fn projected(code: u32) -> Option<Projected> {
     REGISTER.projected(code)
 }
 
-/// The size of the unit of a projected system, metres.
+/// A compound system.
+pub fn compound(code: u32) -> Option<Compound> {
+    REGISTER.compound(code)
+}
+
+/// The size of the unit of eastings and northings of a projected or compound system, metres.
 pub fn unit_m(code: u32) -> Option<f64> {
-    projected(code)?.metres.parse().ok()
+    let horizontal = || projected(compound(code)?.horizontal);
+    projected(code).or_else(horizontal)?.metres.parse().ok()
 }
 
 /// A geographic system; numbers are texts, as the table has them.
@@ -68,6 +78,28 @@ pub struct Projected {
     pub metres: &'static str,
     /// Order of the axes in the register: `EN`, `NE`, or empty where one points elsewhere.
     pub axes: &'static str,
+}
+
+/// A vertical system; numbers are texts, as the table has them.
+pub struct Vertical {
+    pub code: u32,
+    pub name: &'static str,
+    pub datum: &'static str,
+    pub unit: &'static str,
+    pub metres: &'static str,
+    /// `UP` or `DOWN`.
+    pub direction: &'static str,
+}
+
+/// A projected or geographic system with a vertical one.
+pub struct Compound {
+    /// Its own code, where it has one.
+    pub code: Option<u32>,
+    pub name: String,
+    /// Code of the projected or geographic system.
+    pub horizontal: u32,
+    horizontal_wkt: String,
+    pub vertical: Vertical,
 }
 
 impl Geographic {
@@ -104,6 +136,42 @@ impl Projected {
     }
 }
 
+impl Vertical {
+    /// Name, abbreviation and direction of the axis.
+    pub fn axis(&self) -> (&'static str, &'static str, &'static str) {
+        match self.direction {
+            "DOWN" => ("Depth", "D", "down"),
+            _ => ("Gravity-related height", "H", "up"),
+        }
+    }
+
+    fn wkt(&self) -> String {
+        format!(
+            "VERT_CS[\"{}\",VERT_DATUM[\"{}\",2005],UNIT[\"{}\",{}],AXIS[\"{}\",{}],AUTHORITY[\"EPSG\",\"{}\"]]",
+            self.name,
+            self.datum,
+            self.unit,
+            self.metres,
+            self.axis().0,
+            self.direction,
+            self.code
+        )
+    }
+}
+
+impl Compound {
+    fn wkt(&self) -> String {
+        let own = self.code.map(|code| format!(",AUTHORITY[\"EPSG\",\"{code}\"]"));
+        format!(
+            "COMPD_CS[\"{}\",{},{}{}]",
+            self.name,
+            self.horizontal_wkt,
+            self.vertical.wkt(),
+            own.unwrap_or_default()
+        )
+    }
+}
+
 /// The lines of the table, without their kind and code.
 #[derive(Default)]
 struct Register {
@@ -114,27 +182,31 @@ struct Register {
     bases: Vec<u32>,
     geographic: BTreeMap<u32, &'static str>,
     projected: BTreeMap<u32, &'static str>,
+    vertical: BTreeMap<u32, &'static str>,
+    compound: BTreeMap<u32, &'static str>,
 }
 
 impl Register {
     fn of(text: &'static str) -> Self {
         let mut register = Self::default();
-        let (mut geographic, mut projected) = (0, 0);
+        let mut last = [0; 4];
         for line in text.lines() {
             let Some((kind, rest)) = line.split_once('\t') else {
                 continue;
             };
-            let coded = |last: &mut u32| {
+            let mut coded = |kind: usize| {
                 let (step, rest) = rest.split_once('\t')?;
-                *last += step.parse::<u32>().ok()?;
-                Some((*last, rest))
+                last[kind] += step.parse::<u32>().ok()?;
+                Some((last[kind], rest))
             };
             match kind {
                 "S" => register.spheroids.push(rest),
                 "U" => register.units.push(rest),
                 "M" => register.methods.push(rest),
-                "G" => register.geographic.extend(coded(&mut geographic)),
-                _ => register.projected.extend(coded(&mut projected)),
+                "G" => register.geographic.extend(coded(0)),
+                "P" => register.projected.extend(coded(1)),
+                "V" => register.vertical.extend(coded(2)),
+                _ => register.compound.extend(coded(3)),
             }
         }
         register.bases = register.geographic.keys().copied().collect();
@@ -196,6 +268,50 @@ impl Register {
             axes,
         })
     }
+
+    /// Name and definition of a projected or geographic system.
+    fn horizontal(&self, code: u32) -> Option<(String, String)> {
+        if let Some(system) = self.projected(code) {
+            let wkt = system.wkt();
+            return Some((system.name, wkt));
+        }
+        let system = self.geographic(code)?;
+        Some((system.name.to_owned(), system.wkt()))
+    }
+
+    /// The compound system of a horizontal and a vertical system.
+    fn joined(&self, horizontal: u32, vertical: u32) -> Option<Compound> {
+        let (horizontal_name, horizontal_wkt) = self.horizontal(horizontal)?;
+        let [name, datum, unit, metres, direction] = cells(self.vertical.get(&vertical)?)[..] else {
+            return None;
+        };
+        Some(Compound {
+            code: None,
+            name: format!("{horizontal_name} + {name}"),
+            horizontal,
+            horizontal_wkt,
+            vertical: Vertical {
+                code: vertical,
+                name,
+                datum,
+                unit,
+                metres,
+                direction,
+            },
+        })
+    }
+
+    fn compound(&self, code: u32) -> Option<Compound> {
+        let [name, horizontal, vertical] = cells(self.compound.get(&code)?)[..] else {
+            return None;
+        };
+        let mut system = self.joined(horizontal.parse().ok()?, vertical.parse().ok()?)?;
+        system.code = Some(code);
+        if !name.is_empty() {
+            name.clone_into(&mut system.name);
+        }
+        Some(system)
+    }
 }
 
 fn cells(line: &'static str) -> Vec<&'static str> {
@@ -210,10 +326,11 @@ mod tests {
     #[test]
     fn the_table_is_whole_and_most_of_its_systems_can_be_projected_into() {
         assert_eq!((REGISTER.geographic.len(), REGISTER.projected.len()), (662, 5504));
+        assert_eq!((REGISTER.vertical.len(), REGISTER.compound.len()), (291, 448));
         let mut usable = 0;
         let mut other: BTreeMap<String, usize> = BTreeMap::new();
         for &code in REGISTER.projected.keys().chain(REGISTER.geographic.keys()) {
-            match MapSystem::parse(&definition(code).unwrap()) {
+            match MapSystem::parse(&format!("EPSG:{code}")) {
                 Ok(system) => usable += usize::from(system.is_some()),
                 Err(reason) => *other.entry(reason).or_default() += 1,
             }

@@ -35,17 +35,17 @@ pub enum Coordinates {
 }
 
 impl MapSystem {
-    /// The system that a WKT (1 or 2) or `EPSG:` and a code define; `None` for a local frame.
+    /// The system that a WKT (1 or 2) or `EPSG:` and a code define; `None` for a local frame. Codes of a horizontal
+    /// and a vertical system may stand together, as in `EPSG:25832+7837`.
     ///
     /// # Errors
-    /// Why the system is not covered: another projection, units that are not metres, a code that is not known, a
-    /// text that cannot be understood.
+    /// Why the system is not covered: another projection, units that are not metres, depths instead of heights, a
+    /// code that is not known, a text that cannot be understood.
     pub fn parse(text: &str) -> Result<Option<Self>, String> {
         let text = text.trim();
         if let Some(code) = text.strip_prefix("EPSG:") {
-            let known = code.trim().parse().ok().and_then(epsg::definition);
-            let wkt =
-                known.ok_or_else(|| format!("{text} is not among the systems known by their number"))?;
+            let wkt = epsg::definition(code)
+                .ok_or_else(|| format!("{text} is not among the systems known by their number"))?;
             return Self::parse(&wkt);
         }
         let node = Node::parse(text).ok_or("the definition of the system cannot be understood")?;
@@ -65,14 +65,15 @@ impl MapSystem {
     fn of(node: &Node<'_>) -> Result<Option<Self>, String> {
         match node.keyword.to_ascii_uppercase().as_str() {
             "COMPD_CS" | "COMPOUNDCRS" => {
-                let heights = node.children.iter().find(|c| is_geoid(c));
+                let flat = node.children.iter().find(|c| c.is_crs());
+                let Some(flat) = flat.map_or(Ok(None), Self::of)? else {
+                    return Ok(None);
+                };
+                let vertical = node.child(&["VERT_CS", "VERTCRS", "VERTICALCRS"]);
+                vertical.map_or(Ok(()), check_heights)?;
+                let heights = vertical.filter(|vertical| is_geoid(vertical));
                 let heights = heights.map(|heights| heights.name().unwrap_or_default());
-                let flat = node
-                    .children
-                    .iter()
-                    .find(|c| c.is_crs())
-                    .map_or(Ok(None), Self::of)?;
-                Ok(flat.map(|flat| Self { heights, ..flat }))
+                Ok(Some(Self { heights, ..flat }))
             }
             "BOUNDCRS" => {
                 let source = node
@@ -152,20 +153,36 @@ fn datum_name(name: &str) -> String {
 }
 
 /// Whether a vertical system counts heights from anything but the ellipsoid.
-fn is_geoid(node: &Node<'_>) -> bool {
-    let keyword = node.keyword.to_ascii_uppercase();
-    let is_vertical = ["VERT_CS", "VERTCRS", "VERTICALCRS"].contains(&keyword.as_str());
-    is_vertical && !node.text.to_lowercase().contains("ellipsoid")
+fn is_geoid(vertical: &Node<'_>) -> bool {
+    !vertical.text.to_lowercase().contains("ellipsoid")
+}
+
+/// Refuses heights that are not in metres or count downwards.
+fn check_heights(vertical: &Node<'_>) -> Result<(), String> {
+    if !is_in_metres(vertical) {
+        return Err("the unit of its heights is not the metre".to_owned());
+    }
+    let direction = vertical.child(&["AXIS"]).and_then(|axis| axis.values.get(1));
+    if direction.is_some_and(|direction| direction.eq_ignore_ascii_case("down")) {
+        return Err("its heights count downwards".to_owned());
+    }
+    Ok(())
+}
+
+/// Whether the unit of a projected or vertical system is the metre; a missing unit counts as metres. In WKT 2, the unit
+/// may stand in the axes.
+fn is_in_metres(node: &Node<'_>) -> bool {
+    const UNIT: [&str; 2] = ["UNIT", "LENGTHUNIT"];
+    let of_axis = || node.child(&["AXIS"])?.child(&UNIT);
+    let unit = node.child(&UNIT).or_else(of_axis);
+    unit.is_none_or(|unit| unit.factor() == Some(1.0))
 }
 
 fn projection(node: &Node<'_>, base: &Node<'_>) -> Result<Projection, String> {
     let conversion = node.child(&["CONVERSION"]).unwrap_or(node);
     let method = conversion.child(&["PROJECTION", "METHOD"]).and_then(Node::name);
     let method = method.unwrap_or_default();
-    if node
-        .child(&["UNIT", "LENGTHUNIT"])
-        .is_some_and(|unit| unit.factor() != Some(1.0))
-    {
+    if !is_in_metres(node) {
         return Err("its unit is not the metre".to_owned());
     }
     let parameters = Parameters {

@@ -1,11 +1,41 @@
-//! Projected systems as PROJJSON (version 0.7), which GeoParquet takes.
+//! Projected and compound systems as PROJJSON (version 0.7), which GeoParquet takes.
 
-use super::epsg::{Projected, projected};
+use super::epsg::{Projected, Vertical, compound, projected};
 use serde_json::{Value, json};
 
-/// The definition of a projected system in metres, feet or other units; `None` where the table lacks it or its method
-/// has no place here.
+/// The definition of a projected system in metres, feet or other units, or of a compound of one with a vertical
+/// system; `None` where the table lacks it or its method has no place here.
 pub fn projjson(code: u32) -> Option<Value> {
+    let mut definition = match compound(code) {
+        Some(system) => json!({
+            "type": "CompoundCRS",
+            "name": system.name,
+            "components": [of_projected(system.horizontal)?, of_vertical(&system.vertical)?],
+            "id": { "authority": "EPSG", "code": code },
+        }),
+        None => of_projected(code)?,
+    };
+    definition["$schema"] = json!("https://proj.org/schemas/v0.7/projjson.schema.json");
+    Some(definition)
+}
+
+fn of_vertical(system: &Vertical) -> Option<Value> {
+    let unit = unit("LinearUnit", "metre", system.unit, system.metres)?;
+    let (name, abbreviation, direction) = system.axis();
+    Some(json!({
+        "type": "VerticalCRS",
+        "name": system.name,
+        "datum": { "type": "VerticalReferenceFrame", "name": system.datum },
+        "coordinate_system": { "subtype": "vertical", "axis": [axis(name, abbreviation, direction, &unit)] },
+        "id": { "authority": "EPSG", "code": system.code },
+    }))
+}
+
+fn axis(name: &str, abbreviation: &str, direction: &str, unit: &Value) -> Value {
+    json!({ "name": name, "abbreviation": abbreviation, "direction": direction, "unit": unit })
+}
+
+fn of_projected(code: u32) -> Option<Value> {
     let system = projected(code)?;
     let (method, names) = method(system.method)?;
     // WKT 1 says this in the name.
@@ -22,7 +52,6 @@ pub fn projjson(code: u32) -> Option<Value> {
         };
         parameters.push(json!({ "name": parameter, "value": number(value)?, "unit": unit }));
     }
-    let axis = |name: &str, abbreviation: &str, direction: &str, unit: &Value| json!({ "name": name, "abbreviation": abbreviation, "direction": direction, "unit": unit });
     let mut axes = [
         axis("Easting", "E", "east", &length),
         axis("Northing", "N", "north", &length),
@@ -33,7 +62,6 @@ pub fn projjson(code: u32) -> Option<Value> {
         _ => return None,
     }
     Some(json!({
-        "$schema": "https://proj.org/schemas/v0.7/projjson.schema.json",
         "type": "ProjectedCRS",
         "name": name,
         "base_crs": {
@@ -197,6 +225,29 @@ mod tests {
                 "EPSG:{code}: {own} {expected}"
             );
         }
+    }
+
+    /// Compound systems as PROJ writes them (`testdata/crs/compound.py`).
+    #[test]
+    fn heights_of_compound_systems_are_defined_as_by_proj() {
+        let text = include_str!("../../../../testdata/crs/compound.json");
+        let expected: Value = serde_json::from_str(text).unwrap();
+        for system in expected["projjson"].as_array().unwrap() {
+            let code = system["id"]["code"].as_u64().unwrap();
+            let found = projjson(code as u32).unwrap();
+            for key in ["$schema", "type", "name", "id"] {
+                assert_eq!(found[key], system[key], "EPSG:{code}");
+            }
+            assert_eq!(found["components"][0]["name"], system["components"][0]["name"]);
+            for key in ["type", "name", "datum", "coordinate_system"] {
+                assert_eq!(
+                    found["components"][1][key], system["components"][1][key],
+                    "EPSG:{code}"
+                );
+            }
+        }
+        // In degrees.
+        assert_eq!(projjson(9518), None);
     }
 
     /// A length, in metres or with a unit of its own.

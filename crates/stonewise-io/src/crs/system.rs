@@ -15,18 +15,17 @@ pub struct Crs {
 }
 
 impl Crs {
-    /// The system that a text names: WKT 1 or 2 with the authority's code, or `EPSG:25832`.
+    /// The system that a text names: WKT 1 or 2 with the authority's code, `EPSG:25832` or `EPSG:25832+7837`.
     ///
     /// Of a compound system without a code of its own, the horizontal part counts. `None` where the text
     /// holds no EPSG code: a local frame.
     pub fn parse(text: &str) -> Option<Self> {
         let text = text.trim();
         if let Some(code) = text.strip_prefix("EPSG:") {
-            let epsg: i32 = code.trim().parse().ok()?;
-            return match u32::try_from(epsg).ok().and_then(definition) {
+            return match definition(code) {
                 Some(wkt) => Self::parse(&wkt),
                 None => Some(Self {
-                    epsg,
+                    epsg: code.trim().parse().ok()?,
                     name: text.to_owned(),
                     wkt: String::new(),
                 }),

@@ -39,6 +39,65 @@ fn systems_in_feet_are_those_of_proj() {
     }
 }
 
+fn compound() -> Value {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/crs/compound.json");
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+#[test]
+fn compound_systems_are_made_of_the_parts_that_proj_names() {
+    let compound = compound();
+    let systems = compound["systems"].as_array().unwrap();
+    let (mut usable, mut refused) = (0, 0);
+    for row in systems {
+        let text = format!("EPSG:{}", row["code"]);
+        let name = row["name"].as_str().unwrap();
+        let crs = Crs::parse(&text).unwrap();
+        assert_eq!(
+            (crs.epsg.to_string(), crs.name.as_str()),
+            (row["code"].to_string(), name)
+        );
+        let flat = MapSystem::parse(&format!("EPSG:{}", row["horizontal"])).map(Option::unwrap);
+        let expected = match (flat, row["metres"].as_f64(), row["direction"].as_str()) {
+            (Err(reason), ..) => Err(reason),
+            (Ok(_), Some(1.0), Some("down")) => Err("its heights count downwards".to_owned()),
+            (Ok(mut flat), Some(1.0), _) => {
+                flat.heights = Some(row["vertical"].as_str().unwrap().to_owned());
+                Ok(flat)
+            }
+            (Ok(_), ..) => Err("the unit of its heights is not the metre".to_owned()),
+        };
+        if expected.is_ok() {
+            usable += 1;
+        } else {
+            refused += 1;
+        }
+        assert_eq!(MapSystem::parse(&text).map(Option::unwrap), expected, "{text}");
+        let parts = format!("EPSG:{}+{}", row["horizontal"], row["vertical_code"]);
+        assert_eq!(MapSystem::parse(&parts).map(Option::unwrap), expected, "{parts}");
+        let part = Crs::parse(&parts).unwrap();
+        assert_eq!(part.epsg.to_string(), row["horizontal"].to_string());
+    }
+    // Nearly all that are refused have heights or map coordinates in feet.
+    assert_eq!((usable, refused), (329, 119));
+    for row in compound["wkt"].as_array().unwrap() {
+        let by_code = MapSystem::parse(&format!("EPSG:{}", row["code"]));
+        for text in [&row["wkt1"], &row["wkt2"]] {
+            let given = MapSystem::parse(text.as_str().unwrap());
+            match (&given, &by_code) {
+                (Ok(Some(given)), Ok(Some(by_code))) => {
+                    assert_eq!(given.heights, by_code.heights);
+                    assert!(given.shares_datum(by_code));
+                }
+                _ => assert_eq!(given, by_code),
+            }
+        }
+    }
+    let unknown = MapSystem::parse("EPSG:25832+25832").unwrap_err();
+    assert!(unknown.contains("EPSG:25832+25832 is not among the systems"));
+    assert_eq!(Crs::parse("EPSG:25832+1"), None);
+}
+
 #[test]
 fn map_coordinates_are_those_of_proj() {
     let expected = expected();
@@ -187,8 +246,11 @@ fn a_chunk_in_degrees_comes_to_the_system_of_the_clouds() {
     let utm = Crs::parse("EPSG:25832").unwrap().wkt;
     let above_geoid =
         format!("COMPD_CS[\"both\",{utm},VERT_CS[\"DHHN2016 height\",VERT_DATUM[\"DHHN2016\",2005]]]");
-    let above_geoid = map(&above_geoid);
-    assert!(refused(&above_geoid).contains("above a geoid (DHHN2016 height): give its grid (GTX) as geoid"));
+    for above_geoid in [&above_geoid, "EPSG:25832+7837"] {
+        let error = refused(&map(above_geoid));
+        assert!(error.contains("above a geoid (DHHN2016 height): give its grid (GTX or GeoTIFF) as geoid"));
+    }
+    assert!(refused(&map("EPSG:5555")).contains("above a geoid (DHHN92 height)"));
 }
 
 fn geoid_file(name: &str) -> PathBuf {
@@ -201,12 +263,6 @@ fn geoid_file(name: &str) -> PathBuf {
 fn heights_of_a_geoid_are_those_of_proj() {
     let expected: Value =
         serde_json::from_str(&std::fs::read_to_string(geoid_file("geoid.json")).unwrap()).unwrap();
-    let geoid = Geoid::read(&geoid_file("geoid.gtx")).unwrap();
-    let at = |latitude: f64, longitude: f64| Geodetic {
-        latitude: latitude.to_radians(),
-        longitude: longitude.to_radians(),
-        height_m: 100.0,
-    };
     let points: Vec<Vec<f64>> = expected["points"]
         .as_array()
         .unwrap()
@@ -214,22 +270,46 @@ fn heights_of_a_geoid_are_those_of_proj() {
         .map(numbers)
         .collect();
     assert_eq!(points.len(), 40);
-    for p in points {
-        for turn in [0.0, 360.0] {
-            let height = geoid.height_m(&at(p[0], p[1] + turn)).unwrap();
-            assert!((height - p[2]).abs() < 1e-5, "{height} is not {}", p[2]);
+    for (name, tolerance_m) in [
+        ("geoid.gtx", 1e-5),
+        ("geoid_area.tif", 1e-5),
+        ("geoid_strips.tif", 1e-5),
+        // Whole millimetres.
+        ("geoid_point.tif", 5.1e-4),
+    ] {
+        let geoid = Geoid::read(&geoid_file(name)).unwrap();
+        for p in &points {
+            for turn in [0.0, 360.0] {
+                let height = geoid.height_m(&at(p[0], p[1] + turn)).unwrap();
+                assert!(
+                    (height - p[2]).abs() < tolerance_m,
+                    "{name}: {height} is not {}",
+                    p[2]
+                );
+            }
+        }
+        // The corners of the grid; then places off it, and one beside the node without a height.
+        let inwards = if name == "geoid_point.tif" { 1e-9 } else { 0.0 };
+        for latitude in [46.0 + inwards, 52.0 - inwards] {
+            assert!(geoid.height_m(&at(latitude, 4.5 + inwards)).is_some(), "{name}");
+        }
+        for (latitude, longitude) in [
+            (45.99, 5.0),
+            (52.01, 5.0),
+            (47.0, 4.49),
+            (47.0, 10.76),
+            (51.9, 10.7),
+        ] {
+            assert_eq!(geoid.height_m(&at(latitude, longitude)), None, "{name}");
         }
     }
-    // The corners of the grid, beside it, and beside the node without a height.
-    assert!(geoid.height_m(&at(46.0, 4.5)).is_some() && geoid.height_m(&at(52.0, 4.5)).is_some());
-    for (latitude, longitude) in [
-        (45.99, 5.0),
-        (52.01, 5.0),
-        (47.0, 4.49),
-        (47.0, 10.76),
-        (51.9, 10.7),
-    ] {
-        assert_eq!(geoid.height_m(&at(latitude, longitude)), None);
+}
+
+fn at(latitude: f64, longitude: f64) -> Geodetic {
+    Geodetic {
+        latitude: latitude.to_radians(),
+        longitude: longitude.to_radians(),
+        height_m: 100.0,
     }
 }
 
@@ -318,6 +398,77 @@ fn grids_that_are_cut_or_impossible_are_refused() {
             .to_string()
             .contains("cannot read the geoid")
     );
+}
+
+#[test]
+fn geotiff_grids_that_are_cut_or_impossible_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bad.tif");
+    let read = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        Geoid::read(&path).map_err(|error| error.to_string())
+    };
+    for name in ["geoid_area.tif", "geoid_point.tif", "geoid_strips.tif"] {
+        let good = std::fs::read(geoid_file(name)).unwrap();
+        let place = at(48.0, 7.0);
+        let height = read(&good).unwrap().height_m(&place).unwrap();
+        for end in (0..good.len()).step_by(3) {
+            // The part cut off may lie after the first band.
+            match read(&good[..end]) {
+                Ok(geoid) => assert_eq!(geoid.height_m(&place), Some(height), "{name}: {end}"),
+                Err(error) => assert!(error.contains("give a GTX file, or a GeoTIFF"), "{error}"),
+            }
+        }
+        for place in 0..good.len() {
+            let mut bad = good.clone();
+            bad[place] = 0xff;
+            let _ = read(&bad).map(|geoid| geoid.height_m(&at(48.0, 7.0)));
+        }
+    }
+    // Sides of the grid and of its only tile (tags 256, 257, 322 and 323).
+    let side = |tag: u16, pixels: u16| {
+        let words = [tag, 3, 1, 0, pixels];
+        words.into_iter().flat_map(u16::to_le_bytes).collect::<Vec<u8>>()
+    };
+    let sides = [(256, 6), (257, 9), (322, 16), (323, 16)];
+    let huge: Vec<_> = sides.map(|(tag, p)| (side(tag, p), side(tag, 65_520))).into();
+    let text = |old: &str, new: &str| vec![(old.as_bytes().to_owned(), new.as_bytes().to_owned())];
+    let key = |kind: u8| vec![0, 4, 0, 0, 1, 0, kind, 0];
+    for (name, changes, reason) in [
+        ("geoid_area.tif", huge, "limits exceeded"),
+        (
+            "geoid_area.tif",
+            vec![(key(2), key(1))],
+            "not latitudes and longitudes",
+        ),
+        (
+            "geoid_point.tif",
+            text("geoid_undulation", "longitude_offset"),
+            "its first band is a longitude_offset",
+        ),
+        (
+            "geoid_point.tif",
+            text(">0.001<", ">0,001<"),
+            "its scale is not a number",
+        ),
+        (
+            "geoid_point.tif",
+            text("</Item>", "</Itex>"),
+            "its metadata are broken",
+        ),
+    ] {
+        let mut bad = std::fs::read(geoid_file(name)).unwrap();
+        for (old, new) in changes {
+            // GDAL rewrites metadata and leaves the old copy in the file.
+            let places: Vec<usize> = (0..bad.len()).filter(|p| bad[*p..].starts_with(&old)).collect();
+            assert!(!places.is_empty(), "{name}: {reason}");
+            for place in places {
+                bad[place..place + new.len()].copy_from_slice(&new);
+            }
+        }
+        let error = read(&bad).unwrap_err();
+        assert!(error.contains(reason), "{error}");
+    }
 }
 
 #[test]

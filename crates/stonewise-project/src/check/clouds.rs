@@ -12,7 +12,7 @@ use stonewise_base::messages::findings::{
 use stonewise_base::messages::{Message, Said};
 use stonewise_base::settings::Align;
 use stonewise_core::geometry::Bounds;
-use stonewise_io::crs::{Crs, is_in_feet};
+use stonewise_io::crs::{Crs, definition, is_in_feet};
 
 /// Metres in a unit that somebody may have exported, by its name.
 static UNIT_NAMES: [(&Message, f64); 4] = [
@@ -121,16 +121,13 @@ fn spacing(epoch: &Epoch, survey: &Sample) -> Finding {
 /// A coordinate system whose unit is not the metre.
 fn unit_of_system(name: &str, survey: &Sample) -> Option<Finding> {
     let unit = |text: &String| {
-        let crs = Crs::parse(text);
-        let code = crs.as_ref().and_then(|crs| u32::try_from(crs.epsg).ok());
+        let code = Crs::parse(text).and_then(|crs| u32::try_from(crs.epsg).ok());
         // A code stands for its definition, where that is known.
-        let text = match crs {
-            Some(crs) if text.starts_with("EPSG:") && !crs.wkt.is_empty() => crs.wkt,
-            _ => text.clone(),
-        };
-        let text = text.to_ascii_lowercase();
+        let known = text.strip_prefix("EPSG:").and_then(definition);
+        let text = known.unwrap_or_else(|| text.clone()).to_ascii_lowercase();
+        let has = |keywords: [&str; 3]| keywords.iter().any(|keyword| text.contains(keyword));
         let is_geographic =
-            text.starts_with("geogcs") || text.starts_with("geogcrs") || text.starts_with("geodcrs");
+            has(["geogcs", "geogcrs", "geodcrs"]) && !has(["projcs", "projcrs", "projectedcrs"]);
         let feet = [
             "unit[\"foot",
             "unit[\"us survey foot",

@@ -176,7 +176,11 @@ pub fn targets() -> Vec<Target> {
             "cameras/colmap_bin/images.bin",
         ])),
         Target::of_text("opensfm", testdata(&["cameras/opensfm.json"]), cameras),
-        Target::of_bytes("geoid", testdata(&["crs/geoid.gtx"]), geoid),
+        Target::of_bytes(
+            "geoid",
+            testdata(&["crs/geoid.gtx", "crs/geoid_area.tif", "crs/geoid_point.tif"]),
+            geoid,
+        ),
         Target::of_text("coco", vec![text("masks.json", MASKS)], coco),
         Target::of_text("regions", vec![text("regions.json", REGIONS)], regions),
         Target::of_bytes("labels", label_images(), labels).repaired(repair::png),
