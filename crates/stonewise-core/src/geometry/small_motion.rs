@@ -1,9 +1,12 @@
 //! A small rigid motion, fitted to displacements.
 
+use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3, Vector6};
 
 /// Eigenvalues below this share of the largest belong to motions that the samples do not show.
 const LEAST_EIGENVALUE: f64 = 1e-12;
+/// Iterations of the reweighting.
+const ROUNDS: usize = 10;
 
 /// A displacement with its place and covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +31,17 @@ pub struct SmallMotion {
 }
 
 impl SmallMotion {
+    /// A translation; its covariance is zero.
+    pub fn shift(shift: Vector3<f64>) -> Self {
+        let mut motion = Vector6::zeros();
+        motion.fixed_rows_mut::<3>(0).copy_from(&shift);
+        Self {
+            centre: Point3::origin(),
+            motion,
+            covariance: Matrix6::zeros(),
+        }
+    }
+
     /// The rigid motion nearest to the samples by least squares, weighted by their inverse covariances;
     /// samples count as independent.
     ///
@@ -81,9 +95,38 @@ impl SmallMotion {
         })
     }
 
+    /// The rigid motion that most displacements share, by reweighted least squares: those far from it count less (Cauchy
+    /// weights, whose scale is twice the median residual). `None` without displacements.
+    pub fn common(displacements: impl Iterator<Item = (Point3<f64>, Vector3<f64>)>) -> Option<Self> {
+        let mut samples: Vec<DisplacementSample> = displacements
+            .map(|(place, displacement)| DisplacementSample {
+                place,
+                displacement,
+                covariance: Matrix3::identity(),
+            })
+            .collect();
+        let mut common = Self::fit(&samples)?;
+        for _ in 0..ROUNDS {
+            let apart_m = |s: &DisplacementSample| (s.displacement - common.at(&s.place)).norm();
+            let mut all: Vec<f64> = samples.iter().map(apart_m).collect();
+            let usual_m = upper_median(&mut all)?.max(f64::MIN_POSITIVE);
+            for sample in &mut samples {
+                let far = apart_m(sample) / (2.0 * usual_m);
+                sample.covariance = Matrix3::identity() * (1.0 + far * far);
+            }
+            common = Self::fit(&samples)?;
+        }
+        Some(common)
+    }
+
     /// Displacement of a place, metres.
     pub fn at(&self, place: &Point3<f64>) -> Vector3<f64> {
         lever(&(place - self.centre)) * self.motion
+    }
+
+    /// Rotation vector, radians.
+    pub fn rotation(&self) -> Vector3<f64> {
+        self.motion.fixed_rows::<3>(3).into_owned()
     }
 
     /// Covariance of the displacement of a place, m^2.
@@ -159,6 +202,26 @@ mod tests {
         let place = Point3::new(503.0, 699.0, 28.0);
         let turned = fitted.motion.fixed_rows::<3>(3).cross(&(place - fitted.centre));
         assert!((fitted.at(&place) - fitted.motion.fixed_rows::<3>(0) - turned).norm() < 1e-12);
+    }
+
+    #[test]
+    fn the_common_motion_is_that_of_most_places() {
+        let turn = Vector3::new(2e-3, -1e-3, 3e-3);
+        let true_motion = |p: &Point3<f64>| Vector3::new(0.3, -0.1, 0.2) + turn.cross(&p.coords);
+        let moved = samples(60, true_motion).into_iter().enumerate().map(|(i, s)| {
+            let apart = if i % 6 == 0 {
+                Vector3::new(0.0, 0.05, 0.08)
+            } else {
+                Vector3::zeros()
+            };
+            (s.place, true_motion(&s.place) + apart)
+        });
+        let found = SmallMotion::common(moved).unwrap();
+        assert!((found.rotation() - turn).norm() < 1e-9, "{found:?}");
+        assert!((found.at(&found.centre) - true_motion(&found.centre)).norm() < 1e-9);
+        assert!(SmallMotion::common(std::iter::empty()).is_none());
+        let shift = Vector3::new(0.1, 0.2, 0.3);
+        assert_eq!(SmallMotion::shift(shift).at(&found.centre), shift);
     }
 
     #[test]

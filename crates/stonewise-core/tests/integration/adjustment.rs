@@ -425,6 +425,33 @@ fn the_common_motion_is_known_as_well_as_its_covariance_says() {
 }
 
 #[test]
+fn a_rotation_of_the_epoch_does_not_count_as_strain_where_it_is_free() {
+    let wall = Wall::default();
+    let (turn, middle) = (Vector3::new(2e-3, -1.5e-3, 2.5e-3), Point3::new(0.0, 0.85, 0.5));
+    let still = |_: u32, _: &Point3<f64>| (Vector3::zeros(), Vector3::zeros());
+    let turned = |_: u32, c: &Point3<f64>| (turn.cross(&(c - middle)), turn);
+    let adjusted = |pairs: Vec<PairPoints>, free_rotation| {
+        let params = AdjustmentParams {
+            free_rotation,
+            ..AdjustmentParams::default()
+        };
+        adjust(&MemoryPairs::new(pairs), &params, &Silent).unwrap()
+    };
+    let in_face = |report: &AdjustmentReport| report.components.strain[0];
+    let expected = adjusted(wall.pairs(still), false);
+    let tied = adjusted(wall.pairs(turned), false);
+    let free = adjusted(wall.pairs(turned), true);
+    let strains = [&expected, &tied, &free].map(in_face);
+    assert!(strains[1] > 1e-3, "{strains:?}");
+    assert!(strains[2] < strains[0] + 0.05 * strains[1], "{strains:?}");
+    for (free, expected) in motions(&free).iter().zip(motions(&expected)) {
+        assert!((free.rotation - turn).norm() < 1e-3, "{free:?}");
+        let [a, b] = [free, expected].map(|m| m.covariance.fixed_view::<3, 3>(0, 0).trace().sqrt());
+        assert!(a < 1.1 * b, "{a} {b}");
+    }
+}
+
+#[test]
 fn stones_of_the_wrong_partner_are_refused() {
     let wall = Wall::default();
     let mut pairs = wall.pairs(|_, c| (smooth(c), Vector3::zeros()));

@@ -7,7 +7,7 @@ use super::state::Adjustment;
 use crate::geometry::Bounds;
 use crate::statistics::upper_median;
 
-/// A stone's normal equations about the common translation.
+/// A stone's normal equations about the common motion.
 pub(crate) struct StoneEquations {
     /// Moving with the field.
     pub with_field: NormalEquations,

@@ -17,7 +17,7 @@ const ACROSS: f64 = 0.1;
 
 /// A stone's motion with its looseness averaged out, in its frame.
 pub(crate) struct Estimate {
-    /// About the common translation.
+    /// About the common motion.
     pub mean: StoneVector,
     pub covariance: Matrix9,
     /// Covariance of the translation against what the neighbours predict, m^2.
@@ -46,7 +46,7 @@ impl Case {
 }
 
 impl Adjustment {
-    /// A stone's motion about the common translation.
+    /// A stone's motion about the common motion.
     ///
     /// Where the stone is not followed on its own, it moves with its neighbours, and its covariance is
     /// widened for the chance that it does not ([`widening`]). Otherwise mean and covariance are those of the

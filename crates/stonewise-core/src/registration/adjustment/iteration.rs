@@ -135,8 +135,9 @@ impl<'r, 'a, S: PairSource> Evaluated<'r, 'a, S> {
         self.0.adjustment.update_photos(self.0.last.as_ref());
     }
 
-    /// Estimates the variance components.
+    /// Updates the common motion, then estimates the variance components about it.
     pub fn update_components(&mut self) -> Result<(), AdjustError<S::Error>> {
+        self.0.adjustment.follow_common_motion();
         self.0.adjustment.prior.components = self.0.adjustment.components_of_wall(self.0.points.progress)?;
         Ok(())
     }

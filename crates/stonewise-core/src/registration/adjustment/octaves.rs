@@ -3,8 +3,9 @@
 
 use super::state::Adjustment;
 use super::tracking::PhotoPart;
+use crate::geometry::SmallMotion;
 use crate::statistics::{UPPER_95, component_median, quantile};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Share of the stones by which the scatter of their motions is measured.
@@ -19,6 +20,7 @@ const PRIOR_STONES: f64 = 6.0;
 /// from photos lie along its rays, so that those in the face are much smaller, and what photos measure takes little
 /// part in them. How much smaller, the motions themselves show: whatever stones do, their motions scatter at least as
 /// much as their errors. The variances on each axis are therefore no larger than the motions allow.
+#[derive(Clone, Copy)]
 pub(super) struct Octaves {
     /// Variance of one octave on any axis as heights show it, m^2.
     expected_m2: f64,
@@ -32,6 +34,8 @@ pub(super) struct Octaves {
 
 /// A motion by which the errors are measured.
 pub(super) struct Shown {
+    /// Where, world, metres.
+    pub place: Point3<f64>,
     /// World, metres.
     pub displacement: Vector3<f64>,
     pub face_from_world: Matrix3<f64>,
@@ -54,17 +58,26 @@ impl Octaves {
     /// The octaves as large as the motions of stones that are not loose allow. `displacement`: of a stone in its frame.
     pub fn of(adjustment: &Adjustment, displacement: impl Fn(usize) -> Option<Vector3<f64>>) -> Self {
         let expected = Self::expected(adjustment);
+        let free_rotation = adjustment.params.free_rotation;
+        // The fitted rigid motion absorbs the longest octave, so the residuals do not show it.
+        let absorbed = f64::from(u8::from(free_rotation));
+        let scattered = Self {
+            count: (expected.count - absorbed).max(1.0),
+            ..expected
+        };
         let motion = |i: usize| {
-            let face_from_world = adjustment.prior.graph.nodes[i].face_from_world;
+            let node = &adjustment.prior.graph.nodes[i];
+            let face_from_world = node.face_from_world;
             Some(Shown {
+                place: node.centroid,
                 displacement: face_from_world.transpose() * displacement(i)?,
                 face_from_world,
-                expected_m2: expected.over_all(adjustment.photo_part(i).as_ref()).diagonal(),
+                expected_m2: scattered.over_all(adjustment.photo_part(i).as_ref()).diagonal(),
             })
         };
         let motions: Vec<Shown> = (0..adjustment.stones.len()).filter_map(motion).collect();
         Self {
-            shown: shown(&motions),
+            shown: shown(&motions, &common(&motions, free_rotation)),
             ..expected
         }
     }
@@ -101,14 +114,22 @@ impl Octaves {
     }
 }
 
+/// The motion that most stones have in common: a translation, or a rigid motion where epochs may be turned against each
+/// other.
+fn common(motions: &[Shown], free_rotation: bool) -> SmallMotion {
+    let rigid = || SmallMotion::common(motions.iter().map(|m| (m.place, m.displacement)));
+    free_rotation.then(rigid).flatten().unwrap_or_else(|| {
+        let displacements: Vec<Vector3<f64>> = motions.iter().map(|m| m.displacement).collect();
+        SmallMotion::shift(component_median(&displacements))
+    })
+}
+
 /// Factors on the expected variances of errors, per axis of the face, with which normal errors hold 95 % of the
 /// motions about the common one; at most one.
 ///
 /// A median and a quantile: stones that moved on their own do not matter as long as they are few, and if they are
 /// many the factor is too large, but never more than one.
-fn shown(motions: &[Shown]) -> Vector3<f64> {
-    let displacements: Vec<Vector3<f64>> = motions.iter().map(|m| m.displacement).collect();
-    let common = component_median(&displacements);
+fn shown(motions: &[Shown], common: &SmallMotion) -> Vector3<f64> {
     let limit = Normal::standard().inverse_cdf(UPPER_95);
     Vector3::from_fn(|axis, _| {
         let apart = |m: &Shown| {
@@ -116,7 +137,7 @@ fn shown(motions: &[Shown]) -> Vector3<f64> {
                 .face_from_world
                 .row(axis)
                 .transpose()
-                .dot(&(m.displacement - common));
+                .dot(&(m.displacement - common.at(&m.place)));
             let sd = m.expected_m2[axis].sqrt();
             (sd > 0.0).then(|| apart.abs() / sd)
         };
@@ -147,6 +168,7 @@ mod tests {
             let face_from_world = Rotation3::from_euler_angles(0.0, 0.0, 0.01 * i as f64).into_inner();
             let error = Vector3::from(sd_m).map(|sd| sd * normal(&mut rng));
             Shown {
+                place: Point3::new(0.0, 0.1 * i as f64, (0.7 * i as f64).sin()),
                 displacement: face_from_world.transpose() * error + moved(i),
                 face_from_world,
                 expected_m2: Vector3::repeat(1e-6),
@@ -155,11 +177,16 @@ mod tests {
         (0..count).map(stone).collect()
     }
 
+    /// What motions in one frame show.
+    fn apart(motions: &[Shown]) -> Vector3<f64> {
+        shown(motions, &common(motions, false))
+    }
+
     #[test]
     fn the_scatter_of_a_wall_that_moved_as_one_gives_its_errors_on_each_axis() {
         let sd_m = [2e-4, 1e-4, 7e-4];
         for moved in [Vector3::zeros(), Vector3::new(0.03, -0.02, 0.05)] {
-            let found = shown(&motions(2000, sd_m, |_| moved)).map(f64::sqrt);
+            let found = apart(&motions(2000, sd_m, |_| moved)).map(f64::sqrt);
             for k in 0..3 {
                 let by_prior = (6.0 + 2000.0 * (1e3 * sd_m[k]).powi(2)) / 2006.0;
                 assert!((found[k] / by_prior.sqrt() - 1.0).abs() < 0.06, "{found}");
@@ -174,29 +201,43 @@ mod tests {
         };
         let [still, few, many] = [usize::MAX, 50, 4].map(|share| {
             // Stone 0 is in every share.
-            shown(&motions(1000, [3e-4; 3], step(share)))
+            apart(&motions(1000, [3e-4; 3], step(share)))
         });
         assert!((few.z / still.z).sqrt() < 1.25, "{still} {few}");
         assert!(many.z > 0.999 && many.x < 0.2, "{many}");
     }
 
     #[test]
+    fn a_turned_epoch_leaves_what_its_errors_show() {
+        let sd_m = [2e-4, 1e-4, 7e-4];
+        let still = motions(300, sd_m, |_| Vector3::zeros());
+        let turn = Vector3::new(4e-4, -3e-4, 6e-4);
+        let mut turned = motions(300, sd_m, |_| Vector3::zeros());
+        for motion in &mut turned {
+            motion.displacement += Vector3::new(0.1, 0.2, -0.3) + turn.cross(&motion.place.coords);
+        }
+        let found = shown(&turned, &common(&turned, true));
+        assert!((found - apart(&still)).norm() < 0.02, "{found} {}", apart(&still));
+        assert!(apart(&turned).min() > 0.999);
+    }
+
+    #[test]
     fn a_bulge_and_larger_errors_than_expected_leave_what_is_expected() {
         let bulge = |i: usize| Vector3::new(0.0, 0.0, 0.02 * (i as f64 / 60.0).sin());
-        assert!(shown(&motions(300, [1e-4; 3], bulge)).z > 0.999);
+        assert!(apart(&motions(300, [1e-4; 3], bulge)).z > 0.999);
         assert_eq!(
-            shown(&motions(300, [3e-3; 3], |_| Vector3::zeros())),
+            apart(&motions(300, [3e-3; 3], |_| Vector3::zeros())),
             Vector3::repeat(1.0)
         );
     }
 
     #[test]
     fn few_stones_and_no_errors_at_all_leave_what_is_expected() {
-        let few = shown(&motions(3, [0.0; 3], |_| Vector3::zeros()));
+        let few = apart(&motions(3, [0.0; 3], |_| Vector3::zeros()));
         assert!((few - Vector3::repeat(6.0 / 9.0)).norm() < 1e-12);
-        assert_eq!(shown(&[]), Vector3::repeat(1.0));
+        assert_eq!(apart(&[]), Vector3::repeat(1.0));
         let mut exact = motions(20, [1e-4; 3], |_| Vector3::zeros());
         exact.iter_mut().for_each(|m| m.expected_m2 = Vector3::zeros());
-        assert_eq!(shown(&exact), Vector3::repeat(1.0));
+        assert_eq!(apart(&exact), Vector3::repeat(1.0));
     }
 }

@@ -207,7 +207,7 @@ fn failure(adjustment: &Adjustment, i: usize) -> Option<MotionFailure> {
         true => BAD_SHARE_LOOSE,
         false => BAD_SHARE,
     };
-    let disagrees = shows_two_surfaces(e, adjustment.surface.correlation.factor(), share);
+    let disagrees = shows_two_surfaces(e, adjustment.surface.correlation.small, share);
     if e.overlap < params.min_overlap || disagrees {
         return Some(MotionFailure::Disagreement);
     }
@@ -215,7 +215,7 @@ fn failure(adjustment: &Adjustment, i: usize) -> Option<MotionFailure> {
 }
 
 /// Whether more than a share of a stone's cells shows two surfaces; `inflation`: factor on the expected
-/// variances.
+/// variances of small cells.
 fn shows_two_surfaces(equations: &Equations, inflation: f64, share: f64) -> bool {
     let cells = equations.differences.len() as f64;
     let limit = BAD_CELL * inflation;

@@ -32,6 +32,10 @@ pub struct AdjustmentParams {
     /// Neighbours in each of the four directions along the face. 2: the field holds where one neighbour is
     /// missing or loose.
     pub neighbours_per_side: usize,
+    /// Whether one epoch may be turned against the other by more than the usual error of a registration (0.1 mrad), as
+    /// with drone blocks without control points. The rotation that all stones have in common then counts neither as
+    /// strain nor as an error of the clouds. Epochs that are aligned by their stones are always treated this way.
+    pub free_rotation: bool,
     /// Expected share of loose stones; where fewer are found, the share is estimated. 0.03: half and twice
     /// change the recall by a tenth at most.
     pub loose_share: f64,
@@ -72,6 +76,7 @@ impl Default for AdjustmentParams {
             min_points: 25,
             min_overlap: 0.3,
             neighbours_per_side: 2,
+            free_rotation: false,
             loose_share: 0.03,
             loose_move_m: 0.015,
             loose_turn_rad: 0.02,

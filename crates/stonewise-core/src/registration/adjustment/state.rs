@@ -9,6 +9,7 @@ use super::params::AdjustmentParams;
 use super::partial_view::expected_rate;
 use super::stone_vector::StoneVector;
 use super::survey::{StoneInfo, smoothed_shifts};
+use crate::geometry::SmallMotion;
 use crate::statistics::component_median;
 use nalgebra::Vector3;
 
@@ -67,7 +68,7 @@ impl Adjustment {
         };
         let mut prior = MotionPrior::new(&places, params.neighbours_per_side, loose)?;
         let start = smoothed_shifts(&stones, &prior.graph);
-        prior.common = component_median(&start);
+        prior.common = SmallMotion::shift(component_median(&start));
         let layout = Layout {
             cell_m: (params.cell_spacings * spacing_m).max(params.min_cell_m),
             patch_cells: params.patch_cells,
@@ -84,6 +85,25 @@ impl Adjustment {
             wrong_rate: expected_rate(),
             params: params.clone(),
         })
+    }
+
+    /// Sets the origin of the field to the rigid motion that most stones have in common, where epochs may be turned
+    /// against each other ([`AdjustmentParams::free_rotation`]).
+    pub fn follow_common_motion(&mut self) {
+        let stones = self.stones.iter().zip(&self.prior.graph.nodes);
+        let usable = stones.filter(|(stone, _)| stone.info.usable);
+        let moved = usable.map(|(stone, node)| {
+            let motion = &stone.with_field.motion;
+            (
+                node.centroid,
+                node.face_from_world.transpose() * motion.translation(),
+            )
+        });
+        if self.params.free_rotation
+            && let Some(common) = SmallMotion::common(moved)
+        {
+            self.prior.common = common;
+        }
     }
 
     /// Probability beforehand that the clouds show a stone at a wrong place: it grows with the square of what one

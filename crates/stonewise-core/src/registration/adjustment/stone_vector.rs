@@ -24,8 +24,14 @@ impl StoneVector {
 
     /// A motion without rotation and bending.
     pub fn from_translation(translation: Vector3<f64>) -> Self {
+        Self::from_rigid(translation, Vector3::zeros())
+    }
+
+    /// A motion without bending.
+    pub fn from_rigid(translation: Vector3<f64>, rotation: Vector3<f64>) -> Self {
         let mut all = Vector9::zeros();
         all.fixed_rows_mut::<3>(0).copy_from(&translation);
+        all.fixed_rows_mut::<3>(3).copy_from(&rotation);
         Self(all)
     }
 

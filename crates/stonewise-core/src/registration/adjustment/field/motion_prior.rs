@@ -5,6 +5,7 @@ use super::graph::{Graph, Place};
 use super::loose_prior::LoosePrior;
 use super::prior::{Least, Tie};
 use super::variance_components::VarianceComponents;
+use crate::geometry::SmallMotion;
 use crate::registration::adjustment::stone_vector::StoneVector;
 use nalgebra::Vector3;
 
@@ -20,13 +21,12 @@ pub(crate) struct MotionPrior {
     pub cracks: Vec<Crack>,
     /// Number of zones that were found to creep.
     pub zones: usize,
-    /// Common translation about which the field is solved, world.
-    pub common: Vector3<f64>,
+    /// Common motion about which the field is solved, world.
+    pub common: SmallMotion,
 }
 
 impl MotionPrior {
-    /// All ties are whole, and nothing is known of the common translation. `None` where memory does not
-    /// suffice.
+    /// All ties are whole, and nothing is known of the common motion. `None` where memory does not suffice.
     pub fn new(places: &[Place], neighbours_per_side: usize, loose: LoosePrior) -> Option<Self> {
         let graph = Graph::new(places, neighbours_per_side)?;
         Some(Self {
@@ -37,13 +37,17 @@ impl MotionPrior {
             loose,
             cracks: Vec::new(),
             zones: 0,
-            common: Vector3::zeros(),
+            common: SmallMotion::shift(Vector3::zeros()),
         })
     }
 
-    /// The common translation in a stone's frame.
+    /// The common motion in a stone's frame.
     pub fn common_in(&self, i: usize) -> StoneVector {
-        StoneVector::from_translation(self.graph.nodes[i].face_from_world * self.common)
+        let node = &self.graph.nodes[i];
+        StoneVector::from_rigid(
+            node.face_from_world * self.common.at(&node.centroid),
+            node.face_from_world * self.common.rotation(),
+        )
     }
 
     /// Variances of the (translation, rotation, bending) that a stone of the field makes on its own, in its

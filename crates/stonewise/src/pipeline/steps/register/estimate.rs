@@ -62,7 +62,9 @@ fn adjust(
         false => None,
     };
     let photos = photos.as_ref().map(|p| p as &dyn PhotoSource<Error>);
-    let mut report = adjust_with_photos(&pairs, photos, &params.adjustment, context.progress)?;
+    let mut adjustment = params.adjustment.clone();
+    adjustment.free_rotation |= context.project.is_aligned(epochs.later);
+    let mut report = adjust_with_photos(&pairs, photos, &adjustment, context.progress)?;
     pairs.remove()?;
     tracked::write(step, &report)?;
     let joint = report.joint.take();
