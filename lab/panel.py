@@ -570,7 +570,6 @@ SURVEYS = [
     Survey("m_ivy", 93, edits=[cover(**IVY, share=0.8)]),
     # Parts before or behind the face.
     Survey("s_recess", 42, edits=[recess(0.0)]),
-    Survey("m_recess_moves", 62, edits=[recess(0.005)], expected="attention"),
     *(
         Survey(
             f"m_island_{kind}_{round(1e3 * shift)}mm",
