@@ -572,7 +572,7 @@ SURVEYS = [
     Survey("s_recess", 42, edits=[recess(0.0)]),
     *(
         Survey(
-            f"m_island_{kind}_{round(1e3 * shift)}mm",
+            f"s_island_{kind}_{round(1e3 * shift)}mm",
             seed,
             edits=edits,
             expected="attention" if shift else "fine",
@@ -751,7 +751,8 @@ def with_truth(scene, motions, results):
     points = points.assign(stone_id=found, own=true, on_wall=true > 0)[found > 0]
     share = points.groupby("stone_id")["on_wall"].mean()
     groups = points[points["on_wall"]].groupby("stone_id")
-    truth = groups[[f"true_{axis}" for axis in XYZ]].mean()
+    # A median: an outline that reaches over the edge of a moved part holds points of two motions.
+    truth = groups[[f"true_{axis}" for axis in XYZ]].median()
     truth["own"] = groups["own"].agg(lambda own: own.mode()[0])
     stones = stones.join(truth, on="stone_id")
     stones[truth.columns] = stones[truth.columns].fillna(0)
