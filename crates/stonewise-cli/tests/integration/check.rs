@@ -40,8 +40,19 @@ fn points(cloud: &Path) -> Vec<Point3<f64>> {
 /// Replaces a cloud by the same points somewhere else.
 fn map_cloud(cloud: &Path, to: impl Fn(&Point3<f64>) -> Point3<f64>) {
     let moved: Vec<Point3<f64>> = points(cloud).iter().map(to).collect();
+    replace(cloud, None, &moved);
+}
+
+/// Writes the clouds of both epochs again with the code of a coordinate system in their headers.
+fn code_system(dir: &Path, code: &str) {
+    for cloud in ["epoch1/cloud_tls.laz", CLOUD_2].map(|cloud| dir.join(cloud)) {
+        replace(&cloud, Some(code), &points(&cloud));
+    }
+}
+
+fn replace(cloud: &Path, crs: Option<&str>, points: &[Point3<f64>]) {
     fs::remove_file(cloud).unwrap();
-    write_points_laz(cloud, None, &moved, &[]).unwrap();
+    write_points_laz(cloud, crs, points, &[]).unwrap();
 }
 
 /// Writes a cloud again with a coordinate system in its header.
@@ -96,25 +107,13 @@ const CASES: [Case; 17] = [
     ),
     (
         "a system in feet, by its number alone",
-        |dir| {
-            for cloud in ["epoch1/cloud_tls.laz", CLOUD_2].map(|cloud| dir.join(cloud)) {
-                let points = points(&cloud);
-                fs::remove_file(&cloud).unwrap();
-                write_points_laz(&cloud, Some("EPSG:2263"), &points, &[]).unwrap();
-            }
-        },
+        |dir| code_system(dir, "EPSG:2263"),
         "coordinate system is in feet",
         true,
     ),
     (
         "a system in degrees with heights, by its number alone",
-        |dir| {
-            for cloud in ["epoch1/cloud_tls.laz", CLOUD_2].map(|cloud| dir.join(cloud)) {
-                let points = points(&cloud);
-                fs::remove_file(&cloud).unwrap();
-                write_points_laz(&cloud, Some("EPSG:9518"), &points, &[]).unwrap();
-            }
-        },
+        |dir| code_system(dir, "EPSG:9518"),
         "coordinate system is in degrees",
         true,
     ),
