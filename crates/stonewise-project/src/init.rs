@@ -362,6 +362,25 @@ mod tests {
     }
 
     #[test]
+    fn files_of_an_opf_project_are_no_masks() {
+        let (text, lines) = written(&[
+            "2024/x.laz",
+            "2024/images/1.jpg",
+            "2024/dam.opf",
+            "2024/camera_list.json",
+            "2024/input_cameras.json",
+            "2024/scene_reference_frame.json",
+            "2024/calibration/calibrated_cameras.json",
+            "2025/x.laz",
+        ]);
+        assert!(text.contains("cameras = \"2024/dam.opf\""), "{text}");
+        assert!(
+            !text.contains("\nmasks = ") && !lines.contains("left out"),
+            "{text}{lines}"
+        );
+    }
+
+    #[test]
     fn cameras_of_realitycapture_and_bundler_are_no_clouds() {
         let files = [
             "2024/x.laz",

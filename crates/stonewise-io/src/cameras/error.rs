@@ -25,7 +25,7 @@ pub enum CameraError {
     /// Not a camera file.
     #[error(
         "not a camera file: give a Metashape cameras.xml, a COLMAP folder (cameras and images, .txt or .bin), an OpenSfM \
-         reconstruction.json, Pix4D's calibrated_camera_parameters.txt, a transforms.json or an sfm_data.json, RealityCapture's camera \
+         reconstruction.json, Pix4D's calibrated_camera_parameters.txt or project.opf, a transforms.json or an sfm_data.json, RealityCapture's camera \
          parameters (.csv) or a folder of its .xmp files, or a bundle.out: {}", path.display()
     )]
     UnknownFormat {

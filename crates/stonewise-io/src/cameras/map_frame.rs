@@ -23,8 +23,8 @@ pub struct MapFrame {
     pub crs: Option<String>,
     /// What was taken off the coordinates of the clouds, metres.
     pub false_origin: [f64; 3],
-    /// Grid of the geoid above which the heights of the clouds are, GTX or GeoTIFF; `None` for heights above the
-    /// ellipsoid.
+    /// Grid of the geoid above which the heights of the clouds are, in a format of [`Geoid::read`]; `None` for heights
+    /// above the ellipsoid.
     pub geoid: Option<PathBuf>,
 }
 

@@ -1,5 +1,5 @@
-//! Posed photos from other programs: Agisoft Metashape, RealityCapture, COLMAP, OpenSfM, Pix4D, OpenMVG,
-//! nerfstudio, Bundler.
+//! Posed photos from other programs: Agisoft Metashape, RealityCapture, COLMAP, OpenSfM, Pix4D (also as OPF),
+//! OpenMVG, nerfstudio, Bundler.
 //!
 //! Whatever the file says is turned into [`View`](stonewise_core::geometry::View)s: world frame of the file,
 //! first pixel centre at (0.5, 0.5), poses that take world to camera. Views keep the order of the file, and a
@@ -14,6 +14,7 @@ mod metashape;
 mod nerfstudio;
 mod openmvg;
 mod opensfm;
+mod opf;
 mod photo_sizes;
 mod photos;
 mod pix4d;

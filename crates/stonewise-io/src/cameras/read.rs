@@ -3,7 +3,7 @@
 use super::photo_sizes::PhotoSizes;
 use super::{
     CameraError, CameraFile, MapFrame, bundler, colmap, malformed, metashape, nerfstudio, openmvg, opensfm,
-    pix4d, read_text, realitycapture,
+    opf, pix4d, read_text, realitycapture,
 };
 use std::path::Path;
 use stonewise_core::geometry::View;
@@ -18,6 +18,7 @@ const MAX_PIXELS: u64 = 1 << 30;
 ///   files, or a folder that holds them under `sparse/0`, `sparse` or `0`.
 /// - OpenSfM: reconstruction.json.
 /// - Pix4D: PROJECT_calibrated_camera_parameters.txt, with PROJECT_offset.xyz beside it.
+/// - Pix4D and others: the project.opf of the Open Photogrammetry Format, with the files that it names beside it.
 /// - nerfstudio and instant-ngp: transforms.json.
 /// - OpenMVG: sfm_data.json.
 /// - RealityCapture: the CSV of internal and external camera parameters, or a folder with XMP sidecars.
@@ -70,6 +71,7 @@ pub fn read_cameras_on_map(
         match extension(path).as_str() {
             "xml" => metashape::read(path, map)?,
             "json" => read_json(path)?,
+            "opf" => opf::read(path)?,
             "txt" if pix4d::is_pix4d(path) => pix4d::read(path)?,
             "txt" | "bin" => colmap::read_folder(folder)?,
             "csv" if realitycapture::is_csv(path) => realitycapture::read_csv(path, &sizes()?)?,
@@ -114,7 +116,7 @@ pub fn is_camera_file(path: &Path) -> bool {
         .to_string_lossy()
         .to_lowercase();
     match extension(path).as_str() {
-        "xml" => true,
+        "xml" | "opf" => true,
         "csv" => realitycapture::is_csv(path),
         "out" => bundler::is_bundler(path),
         "json" => ["reconstruction", "transforms", "sfm_data"]

@@ -11,7 +11,7 @@ pub enum Remark {
     Disabled,
     /// The photo has its pose from another camera of its rig.
     RigSlave,
-    /// The photo's component has no place in the world, for this reason.
+    /// The photo's component has no place in the world, or its pixels are not read, for this reason.
     NotPlaced(String),
     /// The photo belongs to another reconstruction than the largest.
     SmallerReconstruction,

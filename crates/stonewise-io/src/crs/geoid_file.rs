@@ -1,10 +1,10 @@
-//! Files of geoids: NOAA's VDatum grid shift (GTX) and GeoTIFF.
+//! Files of geoids: NOAA's VDatum grid shift (GTX), GeoTIFF, GRAVSOFT text, and the files of EGM96 and EGM2008.
 //!
 //! GTX, as PROJ reads it: big-endian, corner in the south-west, steps, rows and columns, then single-precision heights
 //! in metres from south to north.
 
 use super::geoid::Geoid;
-use super::geoid_tiff;
+use super::{geoid_egm, geoid_gravsoft, geoid_tiff};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,7 @@ pub struct GeoidError {
 }
 
 impl Geoid {
-    /// Reads a GTX or GeoTIFF file; its first bytes tell which.
+    /// Reads a file of one of these formats; its content tells which.
     ///
     /// # Errors
     /// The file cannot be read, or is no such grid.
@@ -35,12 +35,16 @@ impl Geoid {
         let bytes = fs::read(path).map_err(|e| failed(format!("cannot read the geoid: {e}")))?;
         let grid = if geoid_tiff::is_tiff(&bytes) {
             geoid_tiff::read(&bytes)
+        } else if let Some(grid) = gtx(&bytes).or_else(|| geoid_egm::read(&bytes)) {
+            Ok(grid)
         } else {
-            gtx(&bytes).ok_or_else(|| "neither GTX nor GeoTIFF, or truncated".to_owned())
+            let truncated = || Err("of no known format, or truncated".to_owned());
+            geoid_gravsoft::read(&bytes).unwrap_or_else(truncated)
         };
         grid.map_err(|reason| {
             failed(format!(
-                "not a grid of a geoid ({reason}): give a GTX file, or a GeoTIFF such as those of PROJ"
+                "not a grid of a geoid ({reason}): give a GTX file, a GeoTIFF such as those of PROJ, GRAVSOFT \
+                 text, or a binary file of EGM96 or EGM2008, or convert it with gdal_translate -of GTX"
             ))
         })
     }

@@ -19,5 +19,6 @@ mod laz_points;
 mod map_cameras;
 mod mask_files;
 mod masks;
+mod opf;
 mod photos;
 mod survey_clouds;

@@ -416,7 +416,7 @@ fn geotiff_grids_that_are_cut_or_impossible_are_refused() {
             // The part cut off may lie after the first band.
             match read(&good[..end]) {
                 Ok(geoid) => assert_eq!(geoid.height_m(&place), Some(height), "{name}: {end}"),
-                Err(error) => assert!(error.contains("give a GTX file, or a GeoTIFF"), "{error}"),
+                Err(error) => assert!(error.contains("give a GTX file, a GeoTIFF"), "{error}"),
             }
         }
         for place in 0..good.len() {
@@ -481,4 +481,100 @@ fn poses_that_are_not_earth_centred_are_named() {
         .to_string();
     assert!(error.contains("photo 0.jpg would be -63"), "{error}");
     assert!(error.contains("not earth-centred"), "{error}");
+}
+
+/// A geoid that is linear between the nodes of any grid, so that its heights are known everywhere: metres at degrees,
+/// with longitudes from 0 to 360. It is continuous at Greenwich.
+fn invented_height(latitude: f64, longitude: f64) -> f64 {
+    10.0 + 0.25 * latitude - 0.125 * (longitude - 180.0).abs()
+}
+
+fn assert_invented(path: &Path, tolerance_m: f64) {
+    let geoid = Geoid::read(path).unwrap();
+    for (latitude, longitude) in [
+        (89.99, 0.0),
+        (-89.99, 359.9),
+        (51.07, 7.53),
+        (-33.3, 250.01),
+        (12.34, 359.99),
+        (0.01, 180.0),
+    ] {
+        let expected = invented_height(latitude, longitude);
+        for turn in [0.0, -360.0] {
+            let height = geoid.height_m(&at(latitude, longitude + turn)).unwrap();
+            assert!(
+                (height - expected).abs() < tolerance_m,
+                "{latitude} {longitude}: {height} {expected}"
+            );
+        }
+    }
+}
+
+/// Heights in rows from north to south, each from Greenwich to the east.
+fn invented_rows(per_degree: usize, columns: usize) -> impl Iterator<Item = Vec<f64>> {
+    let step = 1.0 / per_degree as f64;
+    let row = move |row: usize| {
+        let latitude = 90.0 - row as f64 * step;
+        let height = |column: usize| invented_height(latitude, column as f64 * step);
+        (0..columns).map(height).collect()
+    };
+    (0..180 * per_degree + 1).map(row)
+}
+
+#[test]
+fn the_binary_grid_of_egm96_has_the_heights_of_its_layout() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("WW15MGH.DAC");
+    let centimetres = |height: f64| ((100.0 * height).round() as i16).to_be_bytes();
+    let bytes: Vec<u8> = invented_rows(4, 1440).flatten().flat_map(centimetres).collect();
+    assert_eq!(bytes.len(), 2_076_480);
+    std::fs::write(&path, &bytes).unwrap();
+    assert_invented(&path, 0.0051);
+    std::fs::write(&path, &bytes[2..]).unwrap();
+    let error = Geoid::read(&path).unwrap_err().to_string();
+    assert!(error.contains("convert it with gdal_translate"), "{error}");
+}
+
+#[test]
+fn grids_of_gravsoft_have_the_heights_of_their_layout() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("WW15MGH.GRD");
+    let mut text = "   -90.000000   90.000000     .000000  360.000000    1.000000    1.000000\n\n".to_owned();
+    for row in invented_rows(1, 361) {
+        for line in row.chunks(8) {
+            text.extend(line.iter().map(|height| format!("{height:9.3}")));
+            text.push('\n');
+        }
+    }
+    std::fs::write(&path, &text).unwrap();
+    assert_invented(&path, 5.1e-4);
+    for (from, to, part) in [
+        (
+            "    1.000000\n",
+            "    0.999000\n",
+            "not whole numbers of steps apart",
+        ),
+        (
+            "    1.000000\n",
+            "    0.000000\n",
+            "not whole numbers of steps apart",
+        ),
+        (
+            "    1.000000\n",
+            "    0.500000\n",
+            "it has 65341 heights instead of 181 x 721",
+        ),
+        ("   10.000", "   1O.000", "a height is not a number"),
+        ("   90.000000", "   NaN", "not whole numbers of steps apart"),
+        (
+            "   -90.000000   90.000000",
+            "   -91.000000   89.000000",
+            "its size or place is impossible",
+        ),
+    ] {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
+        let error = Geoid::read(&path).unwrap_err().to_string();
+        assert!(error.contains(part) && error.contains("WW15MGH.GRD"), "{error}");
+    }
 }

@@ -17,8 +17,20 @@ pub(super) const MASKS: &str = "masks";
 const PHOTOS: [&str; 5] = ["jpg", "jpeg", "png", "tif", "tiff"];
 /// Names of the files that make a folder a COLMAP model.
 const COLMAP: [&str; 2] = ["images.txt", "images.bin"];
-/// Ends of the names of texts that belong to cameras: those of COLMAP, and Bundler's list of photos.
-const CAMERA_TEXTS: [&str; 4] = ["images.txt", "cameras.txt", "points3d.txt", "list.txt"];
+/// Ends of the names of texts that belong to cameras: those of COLMAP, Bundler's list of photos, and the files of an
+/// OPF project.
+const CAMERA_TEXTS: [&str; 10] = [
+    "images.txt",
+    "cameras.txt",
+    "points3d.txt",
+    "list.txt",
+    "cameras.json",
+    "camera_list.json",
+    "reference_frame.json",
+    "control_points.json",
+    "constraints.json",
+    "gps_bias.json",
+];
 /// Extensions of scans that lie beside each other: no texts, which may be anything.
 const SCANS: [&str; 8] = ["laz", "las", "e57", "ptx", "pts", "ply", "pcd", "xyz"];
 /// Words in names of clouds, by sensor.
@@ -181,9 +193,11 @@ fn gather(dir: &Path, found: &mut Candidates) -> Result<()> {
     for file in &files {
         if is_camera_file(file) {
             found.cameras.push(file.clone());
+        } else if CAMERA_TEXTS.iter().any(|end| name(file).ends_with(end)) {
+            continue;
         } else if has_extension(file, &["json"]) {
             found.masks.push(file.clone());
-        } else if has_extension(file, &CLOUDS) && !CAMERA_TEXTS.iter().any(|end| name(file).ends_with(end)) {
+        } else if has_extension(file, &CLOUDS) {
             found.clouds.push(file.clone());
         }
     }
