@@ -50,8 +50,6 @@ NO_STONE, THING, FLANK = 0, -1, -2
 STATION = np.array([9.0, 0.0, 1.7])
 # Spacing and noise of points put into clouds.
 SPACING_M, NOISE_M = 0.006, 0.0015
-# Point source ids of the simulator's stations.
-SOURCES = 1, 2
 # Errors of the registration of a terrestrial station: shift and rotation about a place on the wall,
 # sd of an axis. They are the simulator's own, applied here so that added points have them, too.
 REGISTRATION_M, REGISTRATION_RAD = 0.0003, 2e-5
@@ -81,17 +79,39 @@ class Cloud:
     time: np.ndarray
     stone: np.ndarray
     # Rotation vector and shift of each source.
-    registration: dict[int, tuple[np.ndarray, np.ndarray]]
+    registration: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     @classmethod
-    def read(cls, path, truth, registration):
+    def read(cls, path, truth):
         """An epoch of the simulator, with the labels of its truth."""
         las = laspy.read(path)
         stone = np.array(laspy.read(truth).stone_id).astype(int)
         intensity, source = np.array(las.intensity).astype(float), np.array(las.point_source_id)
-        cloud = cls(las.xyz, intensity, source, np.array(las.gps_time), stone, registration)
-        cloud.places = cloud.registered(cloud.places, source)
-        return cloud
+        return cls(las.xyz, intensity, source, np.array(las.gps_time), stone)
+
+    def register(self, random):
+        """Gives each station errors of its own."""
+        for source in np.unique(self.source):
+            turn = random.normal(0, REGISTRATION_RAD, 3)
+            self.registration[source] = turn, random.normal(0, REGISTRATION_M, 3)
+        self.places = self.registered(self.places, self.source)
+
+    def close(self, radius, random):
+        """Bends the wall to a tower, which four stations scan; the wall as it was, with the ground.
+
+        The ends of the wall do not meet. The new ground is three metres wide.
+        """
+        self.keep((abs(self.places[:, 0]) < FACE_M) & (self.places[:, 2] > FOOT_M))
+        ground = random.random((60000, 3)) * [3.0, 2 * np.pi * radius, 0.0]
+        ground[:, 1] -= np.pi * radius
+        self.add(ground, 20000, NO_STONE, random)
+        flat = self.places
+        angle, out = flat[:, 1] / radius, radius + flat[:, 0]
+        self.places = np.column_stack([out * np.cos(angle), out * np.sin(angle), flat[:, 2]])
+        # Neighbouring stations overlap.
+        towards = angle + random.normal(0, 0.25, len(angle))
+        self.source = (np.floor(towards / (np.pi / 2)) % 4 + 1).astype(np.uint16)
+        return flat
 
     def registered(self, places, source):
         """Places as the stations have them."""
@@ -142,6 +162,9 @@ class Scene:
     lost: list[int] = field(default_factory=list)
     # Motion of all flanks.
     flanks: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    # Of a tower: its radius, and the points of the first cloud on the wall before it was bent.
+    radius: float | None = None
+    flat: np.ndarray | None = None
     # Rotation vector and shift of the second epoch's frame.
     frame: tuple | None = None
     exchanged: bool = False
@@ -160,7 +183,8 @@ class Scene:
         cloud = self.clouds[0]
         motions = np.zeros_like(cloud.places)
         chosen = cloud.stone > 0
-        places, own = cloud.places[chosen], self.stones.index.get_indexer(cloud.stone[chosen])
+        all_places = cloud.places if self.flat is None else self.flat
+        places, own = all_places[chosen], self.stones.index.get_indexer(cloud.stone[chosen])
         centre, shift, turn = (self.stones[names].to_numpy()[own] for names in TRUE_MOTION)
         if self.exchanged:
             motions[chosen] = rotate(places - centre - shift, -turn) + centre - places
@@ -169,6 +193,8 @@ class Scene:
         for motion in self.moved:
             motions[chosen] += motion(places)
         motions[cloud.stone == FLANK] = self.flanks
+        if self.radius:
+            motions = rotate(motions, about_z(all_places[:, 1] / self.radius))
         return motions
 
 
@@ -178,6 +204,11 @@ def rotate(vectors, turn):
     axis = np.divide(turn, angle, out=np.zeros(np.shape(turn)), where=angle > 0)
     along = (vectors * axis).sum(axis=-1, keepdims=True) * axis
     return along + (vectors - along) * np.cos(angle) + np.cross(axis, vectors) * np.sin(angle)
+
+
+def about_z(angles):
+    """Rotation vectors."""
+    return angles[:, None] * np.array([0.0, 0.0, 1.0])
 
 
 # Edits of the clouds: each takes the scene.
@@ -321,8 +352,10 @@ def snow(scene):
 def block(along, up, out, shift=(0.0, 0.0, 0.0)):
     """A buttress, or a recess where `out` is negative, that moves by the shift.
 
-    Not to be combined with motions of the simulator, which it does not follow.
+    Flanks of a recess belong to the wall around it and stand still. Not to be combined with motions
+    of the simulator, which it does not follow.
     """
+    flanks = np.array(shift) if out > 0 else np.zeros(3)
 
     def edit(scene):
         for epoch, cloud in enumerate(scene.clouds):
@@ -335,10 +368,10 @@ def block(along, up, out, shift=(0.0, 0.0, 0.0)):
             cloud.keep(part | ~within(cloud.places, along, up) | ~inner)
             for y in along:
                 places = scene.random.random((int(abs(out) * (high - low) / SPACING_M**2), 3))
-                places = [out, 0, high - low] * places + [0, y, low] + epoch * np.array(shift)
+                places = [out, 0, high - low] * places + [0, y, low] + epoch * flanks
                 places[:, 0] += scene.face(places)
                 cloud.add(places, intensity, FLANK, scene.random)
-        scene.flanks = np.array(shift)
+        scene.flanks = flanks
         scene.moved.append(lambda places: np.outer(within(places, along, up), shift))
 
     return edit
@@ -467,6 +500,7 @@ NO_ANNEX = {"annex": False}
 HOLLOW = {"plan_radius_m": 8.0, "width_m": 4.0}
 CONVEX = {"plan_radius_m": -8.0, "width_m": 4.0}
 PLUMB = {"batter": 0.0}
+AROUND = {"width_m": 12.0}
 MOVING = {"expected": "attention", "surroundings": NO_ANNEX}
 
 
@@ -485,6 +519,7 @@ class Survey:
     spacing: float = 0.006  # of terrestrial scans
     noise: float | None = None  # of ranges; the simulator's own if none
     scale: float = 1e-6  # to which coordinates are rounded
+    radius: float | None = None  # of the tower to which the wall is bent
     project: str = ""  # further lines of the project file
 
     @property
@@ -597,6 +632,7 @@ SURVEYS = [
     Survey("s_ivy", 40, edits=[cover(**IVY, share=0.8)]),
     Survey("s_ivy_thin", 94, edits=[cover(**IVY, share=0.4)]),
     Survey("m_ivy", 93, edits=[cover(**IVY, share=0.8)]),
+    Survey("s_tower", 901, [loose(3, 0.012)], wall=PLUMB | AROUND, surroundings=BARE, radius=2.0),
     # Parts before or behind the face.
     Survey("s_recess", 42, edits=[recess(0.0)]),
     *(
@@ -721,21 +757,22 @@ def read(survey, folder):
     first = survey.sensors[0]
     stones["points"], stones["visible"] = stones[f"n_{first}_1"], stones[f"vis_{first}"]
     random = np.random.default_rng(survey.seed)
-    clouds = []
+    clouds, flat = [], []
     for epoch, sensor in enumerate(survey.sensors, 1):
         path = folder / f"epoch{epoch}/cloud_{sensor}.laz"
         truth = folder / f"truth/epoch{epoch}_cloud_{sensor}_truth.laz"
-        clouds.append(Cloud.read(path, truth, registration(random) if sensor == "tls" else {}))
-    return Scene(clouds, stones, survey.wall.get("batter", 0.2), random)
-
-
-def registration(random):
-    """The errors of the two stations of an epoch."""
-    errors = {}
-    for station in SOURCES:
-        turn = random.normal(0, REGISTRATION_RAD, 3)
-        errors[station] = turn, random.normal(0, REGISTRATION_M, 3)
-    return errors
+        clouds.append(Cloud.read(path, truth))
+        if survey.radius:
+            flat.append(clouds[-1].close(survey.radius, random))
+        if sensor == "tls":
+            clouds[-1].register(random)
+    scene = Scene(clouds, stones, survey.wall.get("batter", 0.2), random)
+    if survey.radius:
+        scene.radius, scene.flat = survey.radius, flat[0]
+        normal = ["nx", "ny", "nz"]
+        turn = about_z(stones["cy"].to_numpy() / survey.radius)
+        stones[normal] = rotate(stones[normal].to_numpy(), turn)
+    return scene
 
 
 def write(survey, scene, folder):
