@@ -42,6 +42,11 @@ pub enum AuditEvent {
         /// They, the one whose number the new stone has first.
         stones: Vec<StoneId>,
     },
+    /// A stone that another epoch shows as several stones was divided into them.
+    DividedStone {
+        /// Its number, which no stone has any more.
+        stone: StoneId,
+    },
     /// Points far from the main body of a stone, or cut off from it, lost its label.
     DroppedIslands {
         /// The stone.

@@ -44,8 +44,8 @@ mod vote;
 
 pub use audit::AuditEvent;
 pub use carry::{
-    CarriedStone, CarryParams, CarryReport, JoinReport, Joined, NotCarried, PlacedShape, Shown, StoneShape,
-    Whole, carry_labels, join_parts, photos_facing, stone_shapes,
+    CarriedStone, CarryParams, CarryReport, JoinReport, Joined, NotCarried, PlacedShape, Shown, Sought,
+    StoneShape, Whole, carry_labels, join_parts, photos_facing, stone_shapes,
 };
 pub use drop_stones::drop_stones;
 pub use edit::{EditEffect, EditReport, EditedWall, LabelEdit, NoEffect, edit_labels};

@@ -6,6 +6,7 @@ use super::params::CarryParams;
 use super::stone_shape::{Cell, FacePlace, StoneShape};
 use crate::cloud::TileSource;
 use crate::geometry::CellMap;
+use crate::id::StoneId;
 use crate::params::Params;
 use crate::progress::Progress;
 use nalgebra::Vector3;
@@ -21,6 +22,9 @@ const SPREADS: f64 = 3.0;
 /// Cells of a face, at least. 9: three by three; of smaller faces, parts that reach out of the ground or from
 /// behind a plant, many places on a wall look alike.
 const LEAST_CELLS: usize = 9;
+/// Least share of the cells of a part that lie on the whole, and of the points of the whole that its parts hold. 0.6:
+/// as for parts that are joined.
+const LEAST_SHARE: f64 = 0.6;
 
 /// A stone where another epoch should have it.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +33,20 @@ pub struct PlacedShape<'a> {
     pub shape: &'a StoneShape,
     /// How its surroundings moved from that epoch to the other, metres.
     pub shift: Vector3<f64>,
+}
+
+/// Stones that are looked for in an epoch.
+#[derive(Clone, Copy, Debug)]
+pub struct Sought<'a> {
+    /// Where the epoch should have them.
+    pub stones: &'a [PlacedShape<'a>],
+    /// Stones of the epoch that may be several, merged by the detector, with the numbers of their points: those without
+    /// a partner, or with one that may be a part of them.
+    pub maybe_merged: &'a BTreeMap<StoneId, u64>,
+    /// Number of the first stone that is carried.
+    pub first_new: u32,
+    /// Least number of points of a stone.
+    pub min_points: u32,
 }
 
 /// A stone that was carried into an epoch.
@@ -108,6 +126,8 @@ fn missed_by(photos: u32) -> String {
 pub struct CarryReport {
     /// One for each stone, in order.
     pub outcomes: Vec<Result<CarriedStone, NotCarried>>,
+    /// Stones of the epoch that were divided into carried ones and no longer exist.
+    pub divided: BTreeSet<StoneId>,
     /// Tiles whose labels differ now.
     pub tiles: BTreeSet<usize>,
 }
@@ -121,7 +141,11 @@ pub struct CarryReport {
 /// stones claim a point, the first has it. Carried stones are numbered from `first_new` on, in order; each
 /// has at least `min_points` points.
 ///
-/// Cost: one pass over the tiles and one over those that change; memory holds the points near the stones.
+/// A stone of `sought.maybe_merged` is divided if two or more of the stones that are looked for lie on it, hold most
+/// of its points and can be carried if they take them. Points that none of them takes belong to no stone.
+///
+/// Cost: one pass over the tiles, and one over those that change (over all tiles if a stone is divided); memory holds
+/// the points near the stones.
 ///
 /// # Errors
 /// A tile or its labels cannot be read or written, interruption.
@@ -129,12 +153,12 @@ pub fn carry_labels<T: TileSource, S: LabelStore>(
     tiles: &T,
     labels: &S,
     target: &mut S,
-    stones: &[PlacedShape],
-    [first_new, min_points]: [u32; 2],
+    sought: &Sought,
     params: &CarryParams,
     progress: &dyn Progress,
 ) -> Result<CarryReport, TransferError> {
     params.check()?;
+    let stones = sought.stones;
     let mut near: Vec<Vec<Near>> = vec![Vec::new(); stones.len()];
     each_tile(
         tiles,
@@ -158,7 +182,7 @@ pub fn carry_labels<T: TileSource, S: LabelStore>(
                         near.push(Near {
                             point: (tile as u32, i as u32),
                             place,
-                            is_free: other == 0,
+                            stone: StoneId(other),
                         });
                     }
                 }
@@ -166,21 +190,76 @@ pub fn carry_labels<T: TileSource, S: LabelStore>(
         },
     )?;
 
-    let mut claims: BTreeMap<usize, BTreeMap<u32, u32>> = BTreeMap::new();
-    let mut next = first_new;
-    let mut outcomes = Vec::new();
-
-    for (stone, near) in stones.iter().zip(&mut near) {
-        for n in near.iter_mut() {
-            let (tile, index) = n.point;
-            n.is_free &= !claims
-                .get(&(tile as usize))
-                .is_some_and(|c| c.contains_key(&index));
+    let mut wholes = wholes(sought, &near, params);
+    let (outcomes, claims) = loop {
+        let (outcomes, claims) = judge_all(sought, &near, &wholes, params);
+        let is_carried = |part: &&usize| outcomes.get(**part).is_some_and(Result::is_ok);
+        let before = wholes.len();
+        wholes.retain(|_, parts| parts.iter().filter(is_carried).count() >= 2);
+        if wholes.len() == before {
+            break (outcomes, claims);
         }
-        let outcome = judge(stone.shape, near, [next, min_points], params);
+    };
+    let divided: BTreeSet<StoneId> = wholes.into_keys().collect();
+
+    let mut changed = BTreeSet::new();
+    let is_touched = |tile: &usize| !divided.is_empty() || claims.contains_key(tile);
+    for tile in (0..tiles.tile_count()).filter(is_touched) {
+        progress.check()?;
+        let mut table = labels.read(tile).map_err(|e| TransferError::labels(tile, e))?;
+        let mut is_changed = false;
+        for stone in table.stone.iter_mut().filter(|s| divided.contains(&StoneId(**s))) {
+            *stone = NO_STONE.0;
+            is_changed = true;
+        }
+        for (&i, &stone) in claims.get(&tile).into_iter().flatten() {
+            table.stone[i as usize] = stone;
+            table.confidence[i as usize] = 0.0;
+            is_changed = true;
+        }
+        if is_changed {
+            target
+                .write(tile, &table)
+                .map_err(|e| TransferError::labels(tile, e))?;
+            changed.insert(tile);
+        }
+    }
+
+    Ok(CarryReport {
+        outcomes,
+        divided,
+        tiles: changed,
+    })
+}
+
+/// Which stones claim points, by tile and place in it.
+type Claims = BTreeMap<usize, BTreeMap<u32, u32>>;
+
+/// What becomes of the stones that are looked for if these wholes are divided.
+fn judge_all(
+    sought: &Sought,
+    near: &[Vec<Near>],
+    wholes: &BTreeMap<StoneId, BTreeSet<usize>>,
+    params: &CarryParams,
+) -> (Vec<Result<CarriedStone, NotCarried>>, Claims) {
+    let (mut outcomes, mut claims) = (Vec::new(), Claims::new());
+    let mut next = sought.first_new;
+
+    for (k, (stone, near)) in sought.stones.iter().zip(near).enumerate() {
+        let is_free = |n: &Near| {
+            let (tile, index) = n.point;
+            let is_claimed = { claims.get(&(tile as usize)) }.is_some_and(|c| c.contains_key(&index));
+            let is_own_whole = || wholes.get(&n.stone).is_some_and(|parts| parts.contains(&k));
+            !is_claimed && (n.stone == NO_STONE || is_own_whole())
+        };
+        let near: Vec<(Near, bool)> = near.iter().map(|n| (*n, is_free(n))).collect();
+        let outcome = judge(stone.shape, &near, [next, sought.min_points], params);
         if outcome.is_ok() {
             let tolerance_m = tolerance_m(stone.shape, params);
-            for n in near.iter().filter(|n| n.is_on_surface(tolerance_m)) {
+            for (n, _) in near
+                .iter()
+                .filter(|(n, is_free)| *is_free && n.is_on_surface(tolerance_m))
+            {
                 claims
                     .entry(n.point.0 as usize)
                     .or_default()
@@ -191,22 +270,57 @@ pub fn carry_labels<T: TileSource, S: LabelStore>(
         outcomes.push(outcome);
     }
 
-    for (&tile, claimed) in &claims {
-        let mut table = labels.read(tile).map_err(|e| TransferError::labels(tile, e))?;
-        for (&i, &stone) in claimed {
-            table.stone[i as usize] = stone;
-            table.confidence[i as usize] = 0.0;
-        }
-        target
-            .write(tile, &table)
-            .map_err(|e| TransferError::labels(tile, e))?;
-    }
-
-    Ok(CarryReport {
-        outcomes,
-        tiles: claims.into_keys().collect(),
-    })
+    (outcomes, claims)
 }
+
+/// What a part holds of a whole.
+#[derive(Default)]
+struct OnWhole {
+    /// Cells of the part.
+    cells: BTreeSet<Cell>,
+    /// Points of the whole, by tile and place in it.
+    points: BTreeSet<(u32, u32)>,
+}
+
+/// The stones of `sought.maybe_merged` that consist of two or more of the stones that are looked for, with the places
+/// of these in `sought.stones`.
+fn wholes(sought: &Sought, near: &[Vec<Near>], params: &CarryParams) -> BTreeMap<StoneId, BTreeSet<usize>> {
+    let mut parts: BTreeMap<StoneId, BTreeSet<usize>> = BTreeMap::new();
+    let mut held: BTreeMap<StoneId, BTreeSet<(u32, u32)>> = BTreeMap::new();
+    for (k, (stone, near)) in sought.stones.iter().zip(near).enumerate() {
+        if stone.shape.cell_count() < LEAST_CELLS {
+            continue;
+        }
+        let tolerance_m = tolerance_m(stone.shape, params);
+        let mut on: BTreeMap<StoneId, OnWhole> = BTreeMap::new();
+        let mut covered = BTreeSet::new();
+        for n in near.iter().filter(|n| n.is_on_surface(tolerance_m)) {
+            covered.insert(n.place.cell);
+            let on = on.entry(n.stone).or_default();
+            on.cells.insert(n.place.cell);
+            on.points.insert(n.point);
+        }
+        on.retain(|whole, _| sought.maybe_merged.contains_key(whole));
+        for (whole, OnWhole { cells, points }) in on {
+            let held = held.entry(whole).or_default();
+            // Two epochs may show the same part.
+            let is_new = 2 * points.difference(held).count() > points.len();
+            if is_new && cells.len() as f64 >= LEAST_SHARE * covered.len() as f64 {
+                held.extend(points);
+                parts.entry(whole).or_default().insert(k);
+            }
+        }
+    }
+    parts.retain(|whole, parts| {
+        let all = sought.maybe_merged.get(whole).copied().unwrap_or(u64::MAX);
+        let held = held.get(whole).map_or(0, BTreeSet::len);
+        parts.len() >= 2 && held as f64 >= LEAST_SHARE * all as f64
+    });
+    parts
+}
+
+/// The number of points without a stone.
+const NO_STONE: StoneId = StoneId(0);
 
 /// A point near the face of a stone.
 #[derive(Clone, Copy)]
@@ -214,13 +328,13 @@ struct Near {
     /// Tile, and place in it.
     point: (u32, u32),
     place: FacePlace,
-    /// Whether it belongs to no stone.
-    is_free: bool,
+    /// The stone that has it, or [`NO_STONE`].
+    stone: StoneId,
 }
 
 impl Near {
     fn is_on_surface(&self, tolerance_m: f64) -> bool {
-        self.is_free && self.place.height_m.abs() <= tolerance_m
+        self.place.height_m.abs() <= tolerance_m
     }
 }
 
@@ -246,10 +360,10 @@ impl CellContent {
     }
 }
 
-/// Whether a stone is at its place.
+/// Whether a stone is at its place; `near`: points there, and whether the stone may have them.
 fn judge(
     shape: &StoneShape,
-    near: &[Near],
+    near: &[(Near, bool)],
     [number, min_points]: [u32; 2],
     params: &CarryParams,
 ) -> Result<CarriedStone, NotCarried> {
@@ -264,9 +378,9 @@ fn judge(
     let mut cells: CellMap<Cell, CellContent> = CellMap::default();
     let mut points = 0;
 
-    for n in near {
-        let is_own = n.is_on_surface(tolerance_m);
-        if n.is_free && !is_own && n.place.height_m > 0.0 {
+    for (n, is_free) in near {
+        let is_own = *is_free && n.is_on_surface(tolerance_m);
+        if *is_free && !is_own && n.place.height_m > 0.0 {
             continue;
         }
         let content = cells.entry(n.place.cell).or_default();

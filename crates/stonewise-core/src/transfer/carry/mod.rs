@@ -1,4 +1,4 @@
-//! Stones that one epoch shows and the detector missed or divided in another, labelled there by their place.
+//! Stones that one epoch shows and the detector missed, divided or merged in another, labelled there by their place.
 //!
 //! A stone that is still where its neighbours say it must be has the same surface there. Its outline, moved
 //! with its neighbours, then says which points of the other epoch are its own.
@@ -11,7 +11,7 @@ mod stone_shape;
 #[cfg(test)]
 mod tests;
 
-pub use carry_labels::{CarriedStone, CarryReport, NotCarried, PlacedShape, carry_labels};
+pub use carry_labels::{CarriedStone, CarryReport, NotCarried, PlacedShape, Sought, carry_labels};
 pub use params::CarryParams;
 pub use parts::{JoinReport, Joined, Shown, Whole, join_parts};
 pub use photos_facing::photos_facing;

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 #[schemars(transform = with_ranges::<Self>)]
 pub struct CarryParams {
-    /// Whether stones that one epoch shows are looked for in the clouds of others, where the detector missed
-    /// them, and joined, where it divided them. Epochs with masks stay as they are.
+    /// Whether stones of one epoch are corrected by those of others: missed ones are looked for in the cloud, divided
+    /// ones are joined, and merged ones are divided. Epochs with masks stay as they are.
     pub enabled: bool,
     /// Largest mean distance, perpendicular to the face, between the surfaces of both epochs in a cell of 3 cm, metres,
     /// after the motion of the neighbours. 0.03: more than the motion of most loose stones, less than the

@@ -17,7 +17,7 @@ const DESCRIPTION: &str = "What the majority of the photos decided about merged,
 
 /// Meaning of the column `event`.
 const EVENTS: &str = "the decision: split_instance (a mask that covers several stones was divided), joined_fragment (a mask of a part was given to its stone), \
-        outvoted_instance (most photos show something else there), joined_parts (stones that another epoch shows as one, the number of the new stone first), dropped_islands (parts cut off from their stone), dropped_stone (too few points)";
+        outvoted_instance (most photos show something else there), joined_parts (stones that another epoch shows as one, the number of the new stone first), divided_stone (another epoch shows it as several stones, which took its place), dropped_islands (parts cut off from their stone), dropped_stone (too few points)";
 
 /// Writes `audit_epochN.csv`, what the majority of the photos decided about merged, split and dropped
 /// instances, and the metadata of its columns.
@@ -109,6 +109,11 @@ impl AuditRow {
             AuditEvent::JoinedParts { stones } => Self {
                 event: "joined_parts",
                 stones: stones.iter().map(|s| s.0).collect(),
+                ..empty
+            },
+            AuditEvent::DividedStone { stone } => Self {
+                event: "divided_stone",
+                stones: vec![stone.0],
                 ..empty
             },
             AuditEvent::DroppedIslands { stone, points, .. } => Self {

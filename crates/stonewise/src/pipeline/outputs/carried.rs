@@ -10,8 +10,8 @@ use stonewise_core::transfer::{CarriedStone, NotCarried};
 use stonewise_io::table::{Table, write_csv};
 
 /// What the table as a whole holds.
-const DESCRIPTION: &str = "Stones that the photos of one epoch show and those of another do not, and whether they were found in the cloud \
-    of the other, one row per stone and epoch.";
+const DESCRIPTION: &str = "Stones that the photos of one epoch show and those of another do not, or show merged with others, and whether \
+    they were found in the cloud of the other, one row per stone and epoch.";
 
 /// Writes `audit_carried.csv` with the metadata of its columns; nothing where no stone was looked for.
 pub fn write_carry_audit(context: &Context, attempts: &[CarryAttempt]) -> Result<()> {

@@ -1,11 +1,11 @@
-//! Stones that the detector missed in one epoch, from the epochs that show them.
+//! Stones that the detector missed or merged in one epoch, from the epochs that show them.
 //!
 //! A stone that is not detected is not necessarily gone: the detector misses one stone in seven. A stone of
 //! one epoch without a partner in another is therefore looked for in the other's cloud, where its neighbours
 //! predict it. This step comes after the vote of the photos and before edits by hand, which can overrule it.
 //! Epochs with masks stay as they are.
 
-use super::join::JOIN;
+use super::join::{JOIN, may_be_part};
 use super::label::{DiskLabels, Labelled, Labels, last_number, tabulate};
 use super::shapes::{Others, is_corrected, shapes, shift_back};
 use crate::error::Result;
@@ -25,7 +25,8 @@ use stonewise_core::id::StoneId;
 use stonewise_core::matching::MatchReport;
 use stonewise_core::stone::{MatchOutcome, Stone, UnmatchedReason};
 use stonewise_core::transfer::{
-    CarriedStone, CarryReport, NotCarried, PlacedShape, StoneInstances, carry_labels, photos_facing,
+    AuditEvent, CarriedStone, CarryReport, NotCarried, PlacedShape, Sought, StoneInstances, carry_labels,
+    photos_facing,
 };
 
 /// Looks for stones that one epoch shows and another does not: those of later epochs in the reference, then
@@ -59,6 +60,8 @@ pub struct CarryAttempt {
     pub outcome: Outcome,
 }
 
+/// A partner with more than this share of a stone's area is no part of it. 0.9: masks of the same stone differ by less.
+const LARGEST_PART: f64 = 0.9;
 /// What the step says about the stones that it looked for.
 const REPORT: &str = "report.json";
 
@@ -98,31 +101,46 @@ impl Carried {
 fn into_reference(run: &Run) -> Result<Carried> {
     let first = &run.joined(EpochId::REFERENCE)?.labelled;
     let (mut wishes, mut others) = (Vec::new(), Others::new());
+    let mut maybe_merged = points_of(&first.stones);
     for later in run.context.project.epochs.later_ids() {
         let labelled = Arc::clone(&run.joined(later)?.labelled);
-        let report = run.matches("carry-match", Pair::new(first, &labelled), later)?;
-        wishes.extend(backwards(run, Pair::new(first, &labelled), later, &report)?);
+        let pair = Pair::new(&**first, &*labelled);
+        let report = run.matches("carry-match", pair, later)?;
+        let matching = Matching::new(pair, &report);
+        wishes.extend(matching.wishes_of_first(run, later)?);
+        for partners in matching.partners.iter().filter(|p| p.part != Some(Part::Later)) {
+            maybe_merged.remove(&partners.first.id);
+        }
         others.insert(later, labelled);
     }
-    carry_into(run, EpochId::REFERENCE, first, &others, wishes)
+    carry_into(run, EpochId::REFERENCE, first, &others, wishes, &maybe_merged)
 }
 
 fn into_later(run: &Run, later: EpochId) -> Result<Carried> {
     let (first, labelled) = (run.carried(EpochId::REFERENCE)?, &run.joined(later)?.labelled);
-    // Stones that came from another later epoch have no partner in this one yet.
-    let report = match first.is_changed && run.context.project.epochs.len() > 2 {
+    // Stones that were carried into the first epoch, or divided there, may have other partners now.
+    let report = match first.is_changed {
         true => run.matches("carry-match-again", Pair::new(&first.labelled, labelled), later)?,
         false => {
             let before = run.joined(EpochId::REFERENCE)?;
             run.matches("carry-match", Pair::new(&before.labelled, labelled), later)?
         }
     };
-    let wishes = forwards(run, &first.labelled, later, &report)?;
+    let matching = Matching::new(Pair::new(&*first.labelled, &**labelled), &report);
+    let wishes = matching.wishes_of_later(run, later)?;
     let others = Others::from([(EpochId::REFERENCE, Arc::clone(&first.labelled))]);
-    carry_into(run, later, labelled, &others, wishes)
+    let mut maybe_merged = points_of(&labelled.stones);
+    for partners in matching.partners.iter().filter(|p| p.part != Some(Part::First)) {
+        maybe_merged.remove(&partners.later.id);
+    }
+    carry_into(run, later, labelled, &others, wishes, &maybe_merged)
 }
 
-/// A stone that is to be looked for in another epoch.
+fn points_of(stones: &[Stone]) -> BTreeMap<StoneId, u64> {
+    stones.iter().map(|s| (s.id, u64::from(s.points))).collect()
+}
+
+/// A stone that is to be looked for in another epoch: it has no partner there, or one that may be several stones.
 #[derive(Clone, Debug, Serialize)]
 struct Wish {
     /// The epoch that shows it.
@@ -133,12 +151,19 @@ struct Wish {
     shift: Vector3<f64>,
     photos: u32,
     missed: u32,
+    /// Whether it has a partner there; the partner may then be several stones.
+    has_partner: bool,
 }
 
 impl Wish {
     /// `from`: the epoch that shows the stone; `to`: the other. None where the views of the other show the place
     /// nowhere, because it lies before the wall.
-    fn new(run: &Run, stone: &Stone, [from, to]: [EpochId; 2], shift: Vector3<f64>) -> Result<Option<Self>> {
+    fn new(
+        run: &Run,
+        [from, to]: [EpochId; 2],
+        sought: (&Stone, Vector3<f64>, bool),
+    ) -> Result<Option<Self>> {
+        let (stone, shift, has_partner) = sought;
         let steepest = run.context.project.settings.label.max_incidence_rad;
         let facing = |epoch: EpochId, place: &Point3<f64>| {
             let views = &run.posed(epoch)?.views;
@@ -161,6 +186,7 @@ impl Wish {
             shift,
             photos: stone.photos,
             missed: facing[0].saturating_sub(stone.photos) + facing[1],
+            has_partner,
         }))
     }
 
@@ -170,41 +196,122 @@ impl Wish {
     }
 }
 
-/// Stones of the reference without a partner in a later epoch that shows their place.
-fn forwards(run: &Run, first: &Labelled, later: EpochId, report: &MatchReport) -> Result<Vec<Wish>> {
-    let stones: BTreeMap<StoneId, &Stone> = first.stones.iter().map(|s| (s.id, s)).collect();
-    let missing = report.outcomes.iter().zip(&report.local_shifts).filter(|((_, outcome), _)| {
-        matches!(outcome, MatchOutcome::Unmatched(reason) if *reason != UnmatchedReason::Unseen)
-    });
-    missing
-        .filter_map(|((id, _), shift)| Some((*stones.get(id)?, shift)))
-        .filter_map(|(stone, shift)| Wish::new(run, stone, [EpochId::REFERENCE, later], *shift).transpose())
-        .collect()
+/// Stones of two epochs that match.
+struct Partners<'a> {
+    first: &'a Stone,
+    later: &'a Stone,
+    /// How their surroundings moved from the first epoch to the later.
+    shift: Vector3<f64>,
+    /// Which of the two may be only a part of the other.
+    part: Option<Part>,
 }
 
-/// Stones of a later epoch without a partner in the reference.
-fn backwards(
-    run: &Run,
-    labelled: Pair<&Labelled>,
-    later: EpochId,
-    report: &MatchReport,
-) -> Result<Vec<Wish>> {
-    let stones = labelled.map(|l| &l.stones);
-    let is_missing = |s: &&Stone| report.unmatched_second.binary_search(&s.id).is_ok();
-    let missing = stones.later.iter().filter(is_missing);
-    missing
-        .filter_map(|stone| Some((stone, shift_back(stones.first, report, stone)?)))
-        .filter_map(|(stone, shift)| Wish::new(run, stone, [later, EpochId::REFERENCE], shift).transpose())
-        .collect()
+#[derive(Clone, Copy, PartialEq)]
+enum Part {
+    First,
+    Later,
 }
 
-/// Looks for stones of other epochs in one.
+/// The stones of the first epoch and a later one: which match, and which do not.
+struct Matching<'a> {
+    partners: Vec<Partners<'a>>,
+    /// Stones of the first epoch without a partner, why, and how their surroundings moved to the later epoch.
+    first_alone: Vec<(&'a Stone, UnmatchedReason, Vector3<f64>)>,
+    /// Stones of the later epoch without a partner, and how their surroundings moved back to the first.
+    later_alone: Vec<(&'a Stone, Vector3<f64>)>,
+}
+
+impl<'a> Matching<'a> {
+    /// Stones of which only labels or report have a record are left out.
+    fn new(labelled: Pair<&'a Labelled>, report: &MatchReport) -> Self {
+        let by_id = labelled.map(|l| l.stones.iter().map(|s| (s.id, s)).collect::<BTreeMap<_, _>>());
+        let later_alone: Vec<(&Stone, Vector3<f64>)> = { report.unmatched_second.iter() }
+            .filter_map(|id| by_id.later.get(id).copied())
+            .filter_map(|stone| Some((stone, shift_back(&labelled.first.stones, report, stone)?)))
+            .collect();
+        let (mut partners, mut first_alone) = (Vec::new(), Vec::new());
+        for ((id, outcome), &shift) in report.outcomes.iter().zip(&report.local_shifts) {
+            match (by_id.first.get(id), outcome) {
+                (Some(&first), MatchOutcome::Matched { second }) => {
+                    let later = by_id.later.get(second).copied();
+                    partners.extend(later.map(|later| (first, later, shift)));
+                }
+                (Some(&first), MatchOutcome::Unmatched(reason)) => {
+                    first_alone.push((first, *reason, shift));
+                }
+                (None, _) => {}
+            }
+        }
+        let partners = partners.into_iter().map(|(first, later, shift)| {
+            let mut later_alone = later_alone.iter().map(|(stone, _)| *stone);
+            let is_seen = |reason: &UnmatchedReason| *reason != UnmatchedReason::Unseen;
+            let first_alone = first_alone.iter().filter(|(_, reason, _)| is_seen(reason));
+            let mut first_alone = first_alone.map(|(stone, ..)| *stone);
+            let part = match () {
+                () if is_merged(first, later, &shift, &mut later_alone) => Some(Part::Later),
+                () if is_merged(later, first, &-shift, &mut first_alone) => Some(Part::First),
+                () => None,
+            };
+            Partners {
+                first,
+                later,
+                shift,
+                part,
+            }
+        });
+        Self {
+            partners: partners.collect(),
+            first_alone,
+            later_alone,
+        }
+    }
+
+    /// Stones of the later epoch to look for in the first: those without a partner, and those that may be a part of
+    /// their partner.
+    fn wishes_of_first(&self, run: &Run, later: EpochId) -> Result<Vec<Wish>> {
+        let parts = self.partners.iter().filter(|p| p.part == Some(Part::Later));
+        let parts = parts.map(|p| (p.later, -p.shift, true));
+        let missing = self
+            .later_alone
+            .iter()
+            .map(|(stone, shift)| (*stone, *shift, false));
+        let wish = |sought| Wish::new(run, [later, EpochId::REFERENCE], sought).transpose();
+        missing.chain(parts).filter_map(wish).collect()
+    }
+
+    /// Stones of the first epoch to look for in the later one, likewise; without those whose place that one does not
+    /// show.
+    fn wishes_of_later(&self, run: &Run, later: EpochId) -> Result<Vec<Wish>> {
+        let parts = self.partners.iter().filter(|p| p.part == Some(Part::First));
+        let parts = parts.map(|p| (p.first, p.shift, true));
+        let missing = self.first_alone.iter();
+        let missing = missing.filter(|(_, reason, _)| *reason != UnmatchedReason::Unseen);
+        let missing = missing.map(|(stone, _, shift)| (*stone, *shift, false));
+        let wish = |sought| Wish::new(run, [EpochId::REFERENCE, later], sought).transpose();
+        missing.chain(parts).filter_map(wish).collect()
+    }
+}
+
+/// Whether `whole` may be several stones: its partner is smaller, and near it lies a smaller stone of the partner's
+/// epoch that has no partner. `shift`: how the surroundings of `whole` moved to that epoch.
+fn is_merged<'a>(
+    whole: &Stone,
+    partner: &Stone,
+    shift: &Vector3<f64>,
+    alone: &mut impl Iterator<Item = &'a Stone>,
+) -> bool {
+    partner.area_m2 < LARGEST_PART * whole.area_m2 && alone.any(|stone| may_be_part(stone, whole, shift))
+}
+
+/// Looks for stones of other epochs in one; `maybe_merged`: the stones of that epoch that may be divided, with the
+/// numbers of their points.
 fn carry_into(
     run: &Run,
     epoch: EpochId,
     own: &Arc<Labelled>,
     others: &Others,
     wishes: Vec<Wish>,
+    maybe_merged: &BTreeMap<StoneId, u64>,
 ) -> Result<Carried> {
     if wishes.is_empty() {
         return Ok(Carried::unchanged(own));
@@ -223,10 +330,10 @@ fn carry_into(
         settings.label.min_points,
     );
 
-    let key = Key::new("carry", &(params, &wishes), &keys);
+    let key = Key::new("carry", &(params, &wishes, maybe_merged), &keys);
     let step = context.step(&format!("carry-{epoch}"), key, |step, _| {
         let mut target = DiskLabels::new(step.path(), &own.ingested.tiles.surveyed);
-        let report = look_for(context, own, others, &wishes, &mut target)?;
+        let report = look_for(context, own, others, (&wishes, maybe_merged), &mut target)?;
         write_json(&step.file(REPORT), &report)
     })?;
     let report: CarryReport = read_json(&step.file(REPORT))?;
@@ -240,7 +347,10 @@ fn carry_into(
         outcome: outcome.clone(),
     };
 
-    let attempts = wishes.iter().zip(&report.outcomes).map(attempt).collect();
+    // A part that is not carried keeps its partner, so it was not missed.
+    let missed = wishes.iter().zip(&report.outcomes);
+    let missed = missed.filter(|(wish, outcome)| !wish.has_partner || outcome.is_ok());
+    let attempts = missed.map(attempt).collect();
     if report.tiles.is_empty() {
         return Ok(Carried {
             attempts,
@@ -254,6 +364,11 @@ fn carry_into(
         &DiskLabels::new(step.path(), &own.ingested.tiles.surveyed),
     );
     let mut carried = own.carried.clone();
+    transfer.stones.retain(|s| !report.divided.contains(&s.stone));
+    let divided = report.divided.iter();
+    transfer
+        .audit
+        .extend(divided.map(|&stone| AuditEvent::DividedStone { stone }));
 
     for (wish, found) in wishes.iter().zip(&report.outcomes) {
         if let Ok(found) = found {
@@ -286,7 +401,7 @@ fn look_for(
     context: &Context,
     own: &Labelled,
     others: &Others,
-    wishes: &[Wish],
+    (wishes, maybe_merged): (&[Wish], &BTreeMap<StoneId, u64>),
     target: &mut DiskLabels,
 ) -> Result<CarryReport> {
     let settings = &context.project.settings;
@@ -299,12 +414,17 @@ fn look_for(
         let shift = wish.shift;
         Some(PlacedShape { shape, shift })
     });
+    let sought = Sought {
+        stones: &placed.collect::<Vec<_>>(),
+        maybe_merged,
+        first_new: last_number(own) + 1,
+        min_points: settings.label.min_points,
+    };
     let found = carry_labels(
         &own.ingested.tiles,
         &own.store,
         target,
-        &placed.collect::<Vec<_>>(),
-        [last_number(own) + 1, settings.label.min_points],
+        &sought,
         &settings.carry,
         context.progress,
     )?;
@@ -324,6 +444,7 @@ fn look_for(
 
     Ok(CarryReport {
         outcomes: wishes.iter().map(&mut outcome).collect(),
+        divided: found.divided,
         tiles: found.tiles,
     })
 }

@@ -186,7 +186,7 @@ impl<'a> Matching<'a> {
 
 /// Whether a stone is near enough to be a part of another that moved by `shift`, and smaller: within 1.4 sizes
 /// (square roots of the area), where the ends of a stone lie that is eight times as long as high.
-fn may_be_part(part: &Stone, whole: &Stone, shift: &Vector3<f64>) -> bool {
+pub fn may_be_part(part: &Stone, whole: &Stone, shift: &Vector3<f64>) -> bool {
     let apart_m = (whole.centroid + shift - part.centroid).norm();
     part.area_m2 < whole.area_m2 && apart_m * apart_m < 2.0 * whole.area_m2
 }
