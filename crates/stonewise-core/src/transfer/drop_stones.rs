@@ -1,5 +1,6 @@
 //! Stones that turned out to be none.
 
+use super::change_labels::change_labels;
 use super::{LabelStore, TransferError};
 use crate::cloud::TileSource;
 use crate::progress::Progress;
@@ -18,25 +19,16 @@ pub fn drop_stones<T: TileSource, S: LabelStore>(
     stones: &BTreeSet<u32>,
     progress: &dyn Progress,
 ) -> Result<BTreeSet<usize>, TransferError> {
-    let mut changed = BTreeSet::new();
-    progress.each(
-        "stones that are none",
-        0..tiles.tile_count(),
-        |tile| -> Result<(), TransferError> {
-            let mut table = labels.read(tile).map_err(|e| TransferError::labels(tile, e))?;
-            for stone in table.stone.iter_mut().filter(|stone| stones.contains(stone)) {
-                *stone = 0;
-                changed.insert(tile);
-            }
-            if changed.contains(&tile) {
-                target
-                    .write(tile, &table)
-                    .map_err(|e| TransferError::labels(tile, e))?;
-            }
-            Ok(())
-        },
-    )?;
-    Ok(changed)
+    let every = 0..tiles.tile_count();
+    let progress = ("stones that are none", progress);
+    change_labels(labels, target, every, progress, |_, table| {
+        let mut is_changed = false;
+        for stone in table.stone.iter_mut().filter(|stone| stones.contains(stone)) {
+            *stone = 0;
+            is_changed = true;
+        }
+        is_changed
+    })
 }
 
 #[cfg(test)]

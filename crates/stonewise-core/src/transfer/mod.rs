@@ -14,6 +14,7 @@ mod atoms;
 mod audit;
 mod bytes;
 mod carry;
+mod change_labels;
 mod depth;
 mod depth_bounds;
 mod drop_stones;

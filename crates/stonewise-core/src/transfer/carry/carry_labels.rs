@@ -1,5 +1,6 @@
 //! The points of another epoch that belong to a stone.
 
+use super::super::change_labels::change_labels;
 use super::super::each_tile::each_tile;
 use super::super::{LabelStore, TransferError};
 use super::params::CarryParams;
@@ -22,9 +23,10 @@ const SPREADS: f64 = 3.0;
 /// Cells of a face, at least. 9: three by three; of smaller faces, parts that reach out of the ground or from
 /// behind a plant, many places on a wall look alike.
 const LEAST_CELLS: usize = 9;
-/// Least share of the cells of a part that lie on the whole, and of the points of the whole that its parts hold. 0.6:
-/// as for parts that are joined.
-const LEAST_SHARE: f64 = 0.6;
+/// Least share of a part that lies on the whole, and of the points of the whole that its parts hold: not all, because
+/// outlines differ from epoch to epoch, but enough that a neighbour that overlaps the whole is no part, and that no
+/// large piece of the whole is left over.
+pub(super) const LEAST_SHARE: f64 = 0.6;
 
 /// A stone where another epoch should have it.
 #[derive(Clone, Copy, Debug)]
@@ -202,11 +204,10 @@ pub fn carry_labels<T: TileSource, S: LabelStore>(
     };
     let divided: BTreeSet<StoneId> = wholes.into_keys().collect();
 
-    let mut changed = BTreeSet::new();
     let is_touched = |tile: &usize| !divided.is_empty() || claims.contains_key(tile);
-    for tile in (0..tiles.tile_count()).filter(is_touched) {
-        progress.check()?;
-        let mut table = labels.read(tile).map_err(|e| TransferError::labels(tile, e))?;
+    let touched = (0..tiles.tile_count()).filter(is_touched);
+    let progress = ("labels of carried stones", progress);
+    let changed = change_labels(labels, target, touched, progress, |tile, table| {
         let mut is_changed = false;
         for stone in table.stone.iter_mut().filter(|s| divided.contains(&StoneId(**s))) {
             *stone = NO_STONE.0;
@@ -217,13 +218,8 @@ pub fn carry_labels<T: TileSource, S: LabelStore>(
             table.confidence[i as usize] = 0.0;
             is_changed = true;
         }
-        if is_changed {
-            target
-                .write(tile, &table)
-                .map_err(|e| TransferError::labels(tile, e))?;
-            changed.insert(tile);
-        }
-    }
+        is_changed
+    })?;
 
     Ok(CarryReport {
         outcomes,
@@ -252,18 +248,13 @@ fn judge_all(
             let is_own_whole = || wholes.get(&n.stone).is_some_and(|parts| parts.contains(&k));
             !is_claimed && (n.stone == NO_STONE || is_own_whole())
         };
-        let near: Vec<(Near, bool)> = near.iter().map(|n| (*n, is_free(n))).collect();
-        let outcome = judge(stone.shape, &near, [next, sought.min_points], params);
+        let outcome = judge(stone.shape, near, is_free, [next, sought.min_points], params);
         if outcome.is_ok() {
             let tolerance_m = tolerance_m(stone.shape, params);
-            for (n, _) in near
-                .iter()
-                .filter(|(n, is_free)| *is_free && n.is_on_surface(tolerance_m))
-            {
-                claims
-                    .entry(n.point.0 as usize)
-                    .or_default()
-                    .insert(n.point.1, next);
+            let own = near.iter().filter(|n| n.is_on_surface(tolerance_m) && is_free(n));
+            let own: Vec<(u32, u32)> = own.map(|n| n.point).collect();
+            for (tile, index) in own {
+                claims.entry(tile as usize).or_default().insert(index, next);
             }
             next += 1;
         }
@@ -296,11 +287,12 @@ fn wholes(sought: &Sought, near: &[Vec<Near>], params: &CarryParams) -> BTreeMap
         let mut covered = BTreeSet::new();
         for n in near.iter().filter(|n| n.is_on_surface(tolerance_m)) {
             covered.insert(n.place.cell);
-            let on = on.entry(n.stone).or_default();
-            on.cells.insert(n.place.cell);
-            on.points.insert(n.point);
+            if sought.maybe_merged.contains_key(&n.stone) {
+                let on = on.entry(n.stone).or_default();
+                on.cells.insert(n.place.cell);
+                on.points.insert(n.point);
+            }
         }
-        on.retain(|whole, _| sought.maybe_merged.contains_key(whole));
         for (whole, OnWhole { cells, points }) in on {
             let held = held.entry(whole).or_default();
             // Two epochs may show the same part.
@@ -360,10 +352,11 @@ impl CellContent {
     }
 }
 
-/// Whether a stone is at its place; `near`: points there, and whether the stone may have them.
+/// Whether a stone is at its place; `near`: points there; `is_free`: whether the stone may have one of them.
 fn judge(
     shape: &StoneShape,
-    near: &[(Near, bool)],
+    near: &[Near],
+    is_free: impl Fn(&Near) -> bool,
     [number, min_points]: [u32; 2],
     params: &CarryParams,
 ) -> Result<CarriedStone, NotCarried> {
@@ -378,9 +371,10 @@ fn judge(
     let mut cells: CellMap<Cell, CellContent> = CellMap::default();
     let mut points = 0;
 
-    for (n, is_free) in near {
-        let is_own = *is_free && n.is_on_surface(tolerance_m);
-        if *is_free && !is_own && n.place.height_m > 0.0 {
+    for n in near {
+        let is_free = is_free(n);
+        let is_own = is_free && n.is_on_surface(tolerance_m);
+        if is_free && !is_own && n.place.height_m > 0.0 {
             continue;
         }
         let content = cells.entry(n.place.cell).or_default();

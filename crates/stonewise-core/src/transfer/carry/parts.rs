@@ -1,8 +1,9 @@
 //! Stones of one epoch that are parts of a stone of another.
 
+use super::super::change_labels::change_labels;
 use super::super::each_tile::each_tile;
 use super::super::{LabelStore, TransferError};
-use super::carry_labels::{PlacedShape, REACH_M};
+use super::carry_labels::{LEAST_SHARE, PlacedShape, REACH_M};
 use crate::cloud::TileSource;
 use crate::id::StoneId;
 use crate::progress::Progress;
@@ -10,9 +11,6 @@ use crate::stone::Stone;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Least share of the points of a part that lie on the face of the whole: not all, because outlines differ from epoch
-/// to epoch, but enough that a neighbour that overlaps the face is no part.
-const LEAST_SHARE: f64 = 0.6;
 /// Parts whose mean heights above the whole differ by more than this, metres, are not one stone: one of them
 /// moved. Ten millimetres: two thirds of the typical motion of a loose stone, and more than masks and noise
 /// shift the mean height of a part.
@@ -92,10 +90,9 @@ pub fn join_parts<T: TileSource, S: LabelStore>(
         }
     }
 
-    let mut changed = BTreeSet::new();
-    for tile in 0..tiles.tile_count() {
-        progress.check()?;
-        let mut table = labels.read(tile).map_err(|e| TransferError::labels(tile, e))?;
+    let every = 0..tiles.tile_count();
+    let progress = ("labels of joined stones", progress);
+    let changed = change_labels(labels, target, every, progress, |_, table| {
         let mut is_changed = false;
         for stone in &mut table.stone {
             if let Some(&number) = numbers.get(stone) {
@@ -103,13 +100,8 @@ pub fn join_parts<T: TileSource, S: LabelStore>(
                 *stone = number;
             }
         }
-        if is_changed {
-            target
-                .write(tile, &table)
-                .map_err(|e| TransferError::labels(tile, e))?;
-            changed.insert(tile);
-        }
-    }
+        is_changed
+    })?;
 
     Ok(JoinReport {
         joined,

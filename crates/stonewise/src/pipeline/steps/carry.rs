@@ -7,7 +7,7 @@
 
 use super::join::{JOIN, may_be_part};
 use super::label::{DiskLabels, Labelled, Labels, last_number, tabulate};
-use super::shapes::{Others, is_corrected, shapes, shift_back};
+use super::shapes::{Matches, Others, is_corrected, shapes};
 use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
@@ -22,8 +22,7 @@ use std::sync::Arc;
 use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::geometry::View;
 use stonewise_core::id::StoneId;
-use stonewise_core::matching::MatchReport;
-use stonewise_core::stone::{MatchOutcome, Stone, UnmatchedReason};
+use stonewise_core::stone::Stone;
 use stonewise_core::transfer::{
     AuditEvent, CarriedStone, CarryReport, NotCarried, PlacedShape, Sought, StoneInstances, carry_labels,
     photos_facing,
@@ -106,9 +105,10 @@ fn into_reference(run: &Run) -> Result<Carried> {
         let labelled = Arc::clone(&run.joined(later)?.labelled);
         let pair = Pair::new(&**first, &*labelled);
         let report = run.matches("carry-match", pair, later)?;
-        let matching = Matching::new(pair, &report);
-        wishes.extend(matching.wishes_of_first(run, later)?);
-        for partners in matching.partners.iter().filter(|p| p.part != Some(Part::Later)) {
+        let matches = Matches::new(pair, &report);
+        let partners = partners(&matches);
+        wishes.extend(wishes_of_first(run, later, &matches, &partners)?);
+        for partners in partners.iter().filter(|p| p.part != Some(Part::Later)) {
             maybe_merged.remove(&partners.first.id);
         }
         others.insert(later, labelled);
@@ -126,11 +126,12 @@ fn into_later(run: &Run, later: EpochId) -> Result<Carried> {
             run.matches("carry-match", Pair::new(&before.labelled, labelled), later)?
         }
     };
-    let matching = Matching::new(Pair::new(&*first.labelled, &**labelled), &report);
-    let wishes = matching.wishes_of_later(run, later)?;
+    let matches = Matches::new(Pair::new(&*first.labelled, &**labelled), &report);
+    let partners = partners(&matches);
+    let wishes = wishes_of_later(run, later, &matches, &partners)?;
     let others = Others::from([(EpochId::REFERENCE, Arc::clone(&first.labelled))]);
     let mut maybe_merged = points_of(&labelled.stones);
-    for partners in matching.partners.iter().filter(|p| p.part != Some(Part::First)) {
+    for partners in partners.iter().filter(|p| p.part != Some(Part::First)) {
         maybe_merged.remove(&partners.later.id);
     }
     carry_into(run, later, labelled, &others, wishes, &maybe_merged)
@@ -212,84 +213,45 @@ enum Part {
     Later,
 }
 
-/// The stones of the first epoch and a later one: which match, and which do not.
-struct Matching<'a> {
-    partners: Vec<Partners<'a>>,
-    /// Stones of the first epoch without a partner, why, and how their surroundings moved to the later epoch.
-    first_alone: Vec<(&'a Stone, UnmatchedReason, Vector3<f64>)>,
-    /// Stones of the later epoch without a partner, and how their surroundings moved back to the first.
-    later_alone: Vec<(&'a Stone, Vector3<f64>)>,
+/// The stones that match, and which of them may be merged.
+fn partners<'a>(matches: &Matches<'a>) -> Vec<Partners<'a>> {
+    let partners = matches.partners.iter().map(|&(first, later, shift)| {
+        let mut later_alone = matches.later_alone.iter().copied();
+        let mut first_alone = matches.first_alone.iter().map(|(stone, _)| *stone);
+        let part = match () {
+            () if is_merged(first, later, &shift, &mut later_alone) => Some(Part::Later),
+            () if is_merged(later, first, &-shift, &mut first_alone) => Some(Part::First),
+            () => None,
+        };
+        Partners {
+            first,
+            later,
+            shift,
+            part,
+        }
+    });
+    partners.collect()
 }
 
-impl<'a> Matching<'a> {
-    /// Stones of which only labels or report have a record are left out.
-    fn new(labelled: Pair<&'a Labelled>, report: &MatchReport) -> Self {
-        let by_id = labelled.map(|l| l.stones.iter().map(|s| (s.id, s)).collect::<BTreeMap<_, _>>());
-        let later_alone: Vec<(&Stone, Vector3<f64>)> = { report.unmatched_second.iter() }
-            .filter_map(|id| by_id.later.get(id).copied())
-            .filter_map(|stone| Some((stone, shift_back(&labelled.first.stones, report, stone)?)))
-            .collect();
-        let (mut partners, mut first_alone) = (Vec::new(), Vec::new());
-        for ((id, outcome), &shift) in report.outcomes.iter().zip(&report.local_shifts) {
-            match (by_id.first.get(id), outcome) {
-                (Some(&first), MatchOutcome::Matched { second }) => {
-                    let later = by_id.later.get(second).copied();
-                    partners.extend(later.map(|later| (first, later, shift)));
-                }
-                (Some(&first), MatchOutcome::Unmatched(reason)) => {
-                    first_alone.push((first, *reason, shift));
-                }
-                (None, _) => {}
-            }
-        }
-        let partners = partners.into_iter().map(|(first, later, shift)| {
-            let mut later_alone = later_alone.iter().map(|(stone, _)| *stone);
-            let is_seen = |reason: &UnmatchedReason| *reason != UnmatchedReason::Unseen;
-            let first_alone = first_alone.iter().filter(|(_, reason, _)| is_seen(reason));
-            let mut first_alone = first_alone.map(|(stone, ..)| *stone);
-            let part = match () {
-                () if is_merged(first, later, &shift, &mut later_alone) => Some(Part::Later),
-                () if is_merged(later, first, &-shift, &mut first_alone) => Some(Part::First),
-                () => None,
-            };
-            Partners {
-                first,
-                later,
-                shift,
-                part,
-            }
-        });
-        Self {
-            partners: partners.collect(),
-            first_alone,
-            later_alone,
-        }
-    }
+/// Stones of the later epoch to look for in the first: those without a partner, and those that may be a part of their
+/// partner.
+fn wishes_of_first(run: &Run, later: EpochId, matches: &Matches, partners: &[Partners]) -> Result<Vec<Wish>> {
+    let parts = partners.iter().filter(|p| p.part == Some(Part::Later));
+    let parts = parts.map(|p| (p.later, -p.shift, true));
+    let missing =
+        { matches.later_alone.iter() }.filter_map(|stone| Some((*stone, matches.shift_back(stone)?, false)));
+    let wish = |sought| Wish::new(run, [later, EpochId::REFERENCE], sought).transpose();
+    missing.chain(parts).filter_map(wish).collect()
+}
 
-    /// Stones of the later epoch to look for in the first: those without a partner, and those that may be a part of
-    /// their partner.
-    fn wishes_of_first(&self, run: &Run, later: EpochId) -> Result<Vec<Wish>> {
-        let parts = self.partners.iter().filter(|p| p.part == Some(Part::Later));
-        let parts = parts.map(|p| (p.later, -p.shift, true));
-        let missing = self
-            .later_alone
-            .iter()
-            .map(|(stone, shift)| (*stone, *shift, false));
-        let wish = |sought| Wish::new(run, [later, EpochId::REFERENCE], sought).transpose();
-        missing.chain(parts).filter_map(wish).collect()
-    }
-
-    /// Stones of the first epoch to look for in the later one, likewise; without those whose place that one does not
-    /// show.
-    fn wishes_of_later(&self, run: &Run, later: EpochId) -> Result<Vec<Wish>> {
-        let parts = self.partners.iter().filter(|p| p.part == Some(Part::First));
-        let parts = parts.map(|p| (p.first, p.shift, true));
-        let missing = self.first_alone.iter();
-        let missing = missing.filter(|(_, reason, _)| *reason != UnmatchedReason::Unseen);
-        let missing = missing.map(|(stone, _, shift)| (*stone, *shift, false));
-        let wish = |sought| Wish::new(run, [EpochId::REFERENCE, later], sought).transpose();
-        missing.chain(parts).filter_map(wish).collect()
-    }
+/// Stones of the first epoch to look for in the later one, likewise; without those whose place that one does not show.
+fn wishes_of_later(run: &Run, later: EpochId, matches: &Matches, partners: &[Partners]) -> Result<Vec<Wish>> {
+    let parts = partners.iter().filter(|p| p.part == Some(Part::First));
+    let parts = parts.map(|p| (p.first, p.shift, true));
+    let missing = matches.first_alone.iter();
+    let missing = missing.map(|(stone, shift)| (*stone, *shift, false));
+    let wish = |sought| Wish::new(run, [EpochId::REFERENCE, later], sought).transpose();
+    missing.chain(parts).filter_map(wish).collect()
 }
 
 /// Whether `whole` may be several stones: its partner is smaller, and near it lies a smaller stone of the partner's

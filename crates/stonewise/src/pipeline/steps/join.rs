@@ -6,7 +6,7 @@
 
 use super::label::{DiskLabels, Labelled, Labels, STONES, tabulate};
 use super::segment::Segmented;
-use super::shapes::{Others, is_corrected, shapes, shift_back};
+use super::shapes::{Matches, Others, is_corrected, shapes};
 use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::cost::Cost;
@@ -19,8 +19,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::id::StoneId;
-use stonewise_core::matching::MatchReport;
-use stonewise_core::stone::{MatchOutcome, Stone, UnmatchedReason};
+use stonewise_core::stone::Stone;
 use stonewise_core::transfer::{
     AuditEvent, JoinReport, Joined, PlacedShape, Shown, StoneInstances, Transfer, Whole, join_parts,
     photos_facing,
@@ -79,8 +78,14 @@ fn join_reference(run: &Run) -> Result<JoinedEpoch> {
         let labelled = run.found(later)?;
         let pair = Pair::new(&*first, &*labelled);
         let report = run.matches("join-match", pair, later)?;
-        let matching = Matching::new(pair, later, &report);
-        asked.extend(matching.whole_in_later(&*run.posed(later)?, steepest));
+        let (matches, photos) = (Matches::new(pair, &report), run.posed(later)?);
+        asked.extend(whole_in_later(
+            &matches,
+            later,
+            &labelled.stones,
+            &photos,
+            steepest,
+        ));
         others.insert(later, labelled);
     }
     join_into(run, EpochId::REFERENCE, first, &others, asked)
@@ -96,8 +101,8 @@ fn join_later(run: &Run, later: EpochId) -> Result<JoinedEpoch> {
     };
     let pair = Pair::new(&*first.labelled, &*own);
     let report = run.matches(name, pair, later)?;
-    let matching = Matching::new(pair, later, &report);
-    let mut asked = matching.whole_in_first(&*run.posed(EpochId::REFERENCE)?, steepest);
+    let photos = run.posed(EpochId::REFERENCE)?;
+    let mut asked = whole_in_first(&Matches::new(pair, &report), &photos, steepest);
     let shown: BTreeMap<StoneId, Shown> = { first.joined.iter() }
         .filter_map(|joined| Some((*joined.parts.first()?, joined.shown)))
         .collect();
@@ -137,51 +142,33 @@ impl Asked {
     }
 }
 
-/// The first epoch and a later one, with their matches.
-struct Matching<'a> {
-    labelled: Pair<&'a Labelled>,
-    later: EpochId,
-    report: &'a MatchReport,
+/// Stones of the first epoch that may be the whole of later stones without a partner.
+fn whole_in_first(matches: &Matches, photos: &Segmented, steepest: f64) -> Vec<Asked> {
+    let has_part = |(whole, shift): &&(&Stone, Vector3<f64>)| {
+        let mut alone = matches.later_alone.iter();
+        alone.any(|part| may_be_part(part, whole, shift))
+    };
+    let wholes = matches.first.iter().filter(has_part);
+    wholes
+        .map(|(whole, shift)| Asked::new(photos, EpochId::REFERENCE, whole, *shift, steepest))
+        .collect()
 }
 
-impl<'a> Matching<'a> {
-    fn new(labelled: Pair<&'a Labelled>, later: EpochId, report: &'a MatchReport) -> Self {
-        Self {
-            labelled,
-            later,
-            report,
-        }
-    }
-
-    /// Stones of the first epoch that may be the whole of later stones without a partner.
-    fn whole_in_first(&self, photos: &Segmented, steepest: f64) -> Vec<Asked> {
-        let Pair { first, later } = self.labelled;
-        let alone = |s: &&Stone| self.report.unmatched_second.binary_search(&s.id).is_ok();
-        let alone: Vec<&Stone> = later.stones.iter().filter(alone).collect();
-        let wholes = first.stones.iter().zip(&self.report.local_shifts);
-        wholes
-            .filter(|(whole, shift)| alone.iter().any(|part| may_be_part(part, whole, shift)))
-            .map(|(whole, shift)| Asked::new(photos, EpochId::REFERENCE, whole, *shift, steepest))
-            .collect()
-    }
-
-    /// Stones of the later epoch that may be the whole of first stones without a partner.
-    fn whole_in_later(&self, photos: &Segmented, steepest: f64) -> Vec<Asked> {
-        let Pair { first, later } = self.labelled;
-        let outcomes = first.stones.iter().zip(&self.report.outcomes);
-        let alone: Vec<&Stone> = outcomes
-            .filter(|(_, (_, outcome))| {
-                matches!(outcome, MatchOutcome::Unmatched(reason) if *reason != UnmatchedReason::Unseen)
-            })
-            .map(|(stone, _)| stone)
-            .collect();
-        let asked = |whole: &Stone| {
-            let shift = shift_back(&first.stones, self.report, whole)?;
-            let has_part = alone.iter().any(|part| may_be_part(part, whole, &shift));
-            has_part.then(|| Asked::new(photos, self.later, whole, shift, steepest))
-        };
-        later.stones.iter().filter_map(asked).collect()
-    }
+/// Stones of a later epoch that may be the whole of first stones without a partner.
+fn whole_in_later(
+    matches: &Matches,
+    later: EpochId,
+    stones: &[Stone],
+    photos: &Segmented,
+    steepest: f64,
+) -> Vec<Asked> {
+    let asked = |whole: &Stone| {
+        let shift = matches.shift_back(whole)?;
+        let mut alone = matches.first_alone.iter();
+        let has_part = alone.any(|(part, _)| may_be_part(part, whole, &shift));
+        has_part.then(|| Asked::new(photos, later, whole, shift, steepest))
+    };
+    stones.iter().filter_map(asked).collect()
 }
 
 /// Whether a stone is near enough to be a part of another that moved by `shift`, and smaller: within 1.4 sizes
