@@ -4,7 +4,7 @@ use super::candidate::Moving;
 use super::field::{Prediction, covariance_against, posterior};
 use super::observation::NormalEquations;
 use super::solution::Solution;
-use super::state::{Adjustment, StoneState};
+use super::state::{Adjustment, Evidence, StoneState};
 use super::stone_vector::{Matrix9, StoneVector, Vector9};
 use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -14,6 +14,9 @@ const OUTSIDE: f64 = 0.05;
 /// Probability, before its observations, that a stone beside a crack moves with the other side: cracks follow joints, and
 /// the line that stands for one cuts off the corners.
 const ACROSS: f64 = 0.1;
+/// Probability that a stone is loose if its points favour its own motion but one of its halves contradicts it: masks
+/// that took in something else on one side are about twice as frequent as loose stones.
+const CONTRADICTED: f64 = 0.3;
 
 /// A stone's motion with its looseness averaged out, in its frame.
 pub(crate) struct Estimate {
@@ -49,7 +52,8 @@ impl Adjustment {
     /// A stone's motion about the common motion.
     ///
     /// Where the stone is not followed on its own, it moves with its neighbours, and its covariance is
-    /// widened for the chance that it does not ([`widening`]). Otherwise mean and covariance are those of the
+    /// widened for the chance that it does not ([`widening`]). If its observations contradict each other, it moves with
+    /// its neighbours, and its covariance allows for its own motion. Otherwise mean and covariance are those of the
     /// mixture of three cases: it moves with the field, it is loose, or its clouds show it at a wrong place, and
     /// only photos and neighbours say where it is. Beside a crack, the field is a mixture of that of either side.
     ///
@@ -120,7 +124,11 @@ impl Adjustment {
         let loose = case(prediction, at_own, &self.prior.loose_variances(), 0.0);
         let wrong = case(prediction, &without_clouds, &own, slide_m2);
         cases.extend([loose.of_probability(p_loose), wrong.of_probability(p_wrong)]);
-        Estimate::of(&cases)
+        let mixture = Estimate::of(&cases);
+        match stone.evidence {
+            Evidence::Contradictory => mixture.about(Estimate::of(&tied(1.0))),
+            Evidence::TooWeak | Evidence::Decides => mixture,
+        }
     }
 
     /// By how much the stones beyond a crack beside each stone moved more than it, in its frame; `None` for a stone with
@@ -143,12 +151,13 @@ impl Adjustment {
         sums.into_iter().enumerate().map(mean).collect()
     }
 
-    /// Probability that a stone is loose; what is expected of any stone where its own observations cannot
-    /// tell.
+    /// Probability that a stone is loose; where its own observations are too weak to tell, what is expected of any
+    /// stone, and where they contradict each other, [`CONTRADICTED`].
     pub fn p_loose(&self, stone: &StoneState) -> f64 {
-        match stone.is_undecided {
-            true => self.prior.loose.share,
-            false => (1.0 - stone.p_with_field) * (1.0 - stone.doubt),
+        match stone.evidence {
+            Evidence::TooWeak => self.prior.loose.share,
+            Evidence::Contradictory => CONTRADICTED,
+            Evidence::Decides => (1.0 - stone.p_with_field) * (1.0 - stone.doubt),
         }
     }
 }
@@ -176,6 +185,17 @@ impl Estimate {
             sum.by_field += case.by_field * p;
         }
         sum
+    }
+
+    /// The mean of another estimate, with the second moments of this one about it as covariance.
+    fn about(self, other: Self) -> Self {
+        let apart = *(self.mean - other.mean).unknowns();
+        let between = apart * apart.transpose();
+        Self {
+            covariance: self.covariance + between,
+            relative_covariance: self.relative_covariance + between.fixed_view::<3, 3>(0, 0),
+            ..other
+        }
     }
 }
 

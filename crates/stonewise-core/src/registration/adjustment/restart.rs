@@ -140,7 +140,7 @@ impl Adjustment {
                 noise: &self.surface.noise,
                 layout: &self.surface.layout,
             };
-            (test.run(inflation).log_ratio <= most).then_some(there)
+            (test.log_ratio() <= most).then_some(there)
         })
     }
 

@@ -3,7 +3,7 @@
 use super::field::{Prediction, posterior};
 use super::observation::NormalEquations;
 use super::solution::Solution;
-use super::state::Adjustment;
+use super::state::{Adjustment, Evidence};
 use super::stone_vector::{Matrix9, Vector9};
 use nalgebra::{Matrix3, SMatrix};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -30,7 +30,10 @@ pub(crate) fn test_stones(adjustment: &Adjustment, solution: &Solution) -> Vec<T
     let p_error: Vec<Option<f64>> = adjustment
         .stones
         .iter()
-        .map(|s| s.on_own.as_ref().map(|_| 1.0 - adjustment.p_loose(s)))
+        .map(|s| {
+            let is_candidate = s.on_own.is_some() && s.evidence != Evidence::Contradictory;
+            is_candidate.then(|| 1.0 - adjustment.p_loose(s))
+        })
         .collect();
     let loose = within_error_rate(&p_error, adjustment.params.false_discovery_rate);
     p_values(adjustment, solution)

@@ -8,7 +8,7 @@ use super::field::{
 };
 use super::observation::NormalEquations;
 use super::partial_view::estimated_rate;
-use super::state::{Adjustment, StoneState};
+use super::state::{Adjustment, Evidence, StoneState};
 use crate::progress::{Interrupted, Progress};
 use nalgebra::{Matrix3, Vector3};
 
@@ -240,7 +240,7 @@ impl Adjustment {
         for (i, prediction) in field.from_others.iter().enumerate() {
             self.stones[i].doubt = self.doubt(i, prediction);
         }
-        let decided = || self.stones.iter().filter(|s| !s.is_undecided);
+        let decided = || self.stones.iter().filter(|s| s.evidence == Evidence::Decides);
         let wrong = |s: &StoneState| (s.info.hidden.powi(2), s.p_wrong());
         self.wrong_rate = estimated_rate(decided().map(wrong));
         self.prior.loose.share = estimated_share(self.params.loose_share, decided().map(|s| self.p_loose(s)));
@@ -270,8 +270,12 @@ impl Adjustment {
             let is_contradicted =
                 self.stones[i].ratio.is_contradicted && !self.photos_show_own_motion(i, prediction);
             let stone = &mut self.stones[i];
-            stone.is_undecided = is_open || is_contradicted;
-            if stone.is_undecided {
+            stone.evidence = match () {
+                () if is_open => Evidence::TooWeak,
+                () if is_contradicted => Evidence::Contradictory,
+                () => Evidence::Decides,
+            };
+            if stone.evidence != Evidence::Decides {
                 stone.p_with_field = 1.0;
             }
         }
@@ -281,6 +285,7 @@ impl Adjustment {
 #[cfg(test)]
 mod tests {
     use super::super::observation::photo::{BiasWeights, PhotoModel, PoseInfluence, StonePhotos};
+    use super::super::significance::test_stones;
     use super::super::testing::{COLUMNS, begun, wall};
     use super::*;
     use crate::registration::points::MemoryPairs;
@@ -367,6 +372,54 @@ mod tests {
             (along - 0.015).abs() < 1.96 * sd && along < 1.96 * sd,
             "{hidden:?}"
         );
+    }
+
+    #[test]
+    fn the_interval_of_a_stone_one_half_of_which_contradicts_its_own_motion_holds_both() {
+        let torn = 20;
+        let moved = Vector3::new(0.0, 0.015, 0.0);
+        let source = MemoryPairs::new(wall(5, [0.001; 2], |k| {
+            moved * f64::from(u8::from(k as usize == torn))
+        }));
+        let (mut adjustment, points) = begun(&source);
+        adjustment.estimate_noise(&points.sample);
+        for _ in 0..8 {
+            adjustment.evaluate(&points).unwrap();
+            let equations = adjustment.equations();
+            let field = adjustment.solve_and_reweight(&equations).unwrap();
+            adjustment.step(&Solution { equations, field });
+        }
+        adjustment.evaluate(&points).unwrap();
+        adjustment.stones[torn].ratio.is_contradicted = true;
+        let equations = adjustment.equations();
+        let field = adjustment.solve_and_reweight(&equations).unwrap();
+        let solution = Solution { equations, field };
+
+        let stone = &adjustment.stones[torn];
+        assert_eq!(stone.evidence, Evidence::Contradictory);
+        assert_eq!(adjustment.p_loose(stone), 0.3);
+        let estimate = adjustment.estimate(torn, &solution, &adjustment.shared_variances(1.0), None);
+        let along = (estimate.mean + adjustment.prior.common_in(torn)).translation().x;
+        let sd = estimate.covariance[(0, 0)].sqrt();
+        // It stays with its neighbours; the second moment of 15 mm with this probability.
+        assert!(along.abs() < 5e-4, "{along}");
+        assert!((sd - 0.015 * 0.3_f64.sqrt()).abs() < 5e-4, "{sd}");
+        assert!(1.96 * sd > 0.015, "{sd}");
+
+        // However many other stones are loose for certain, it is not called loose.
+        for (i, other) in adjustment.stones.iter_mut().enumerate() {
+            if i == torn {
+                continue;
+            }
+            other.on_own = Some(other.with_field.clone());
+            other.evidence = Evidence::Decides;
+            other.p_with_field = 0.0;
+            other.doubt = 0.0;
+        }
+        let called = test_stones(&adjustment, &solution);
+        let called: Vec<usize> = (0..called.len()).filter(|i| called[*i].is_loose).collect();
+        assert_eq!(called.len(), adjustment.stones.len() - 1);
+        assert!(!called.contains(&torn));
     }
 
     #[test]

@@ -26,6 +26,17 @@ pub(crate) struct Adjustment {
     pub params: AdjustmentParams,
 }
 
+/// Whether a stone's observations tell a loose stone from one that moves with the field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Evidence {
+    /// They tell.
+    Decides,
+    /// They hardly constrain its motion.
+    TooWeak,
+    /// They favour its own motion, and one of its halves contradicts it.
+    Contradictory,
+}
+
 /// A stone between iterations.
 pub(crate) struct StoneState {
     pub info: StoneInfo,
@@ -45,9 +56,8 @@ pub(crate) struct StoneState {
     pub p_with_field: f64,
     /// Probability that the clouds show it at a wrong place, if they show it away from its neighbours.
     pub doubt: f64,
-    /// Whether its observations are too weak, or contradict each other too much, to tell a loose stone from
-    /// one that moves with the field.
-    pub is_undecided: bool,
+    /// Whether its observations tell a loose stone from one that moves with the field.
+    pub evidence: Evidence,
     /// Whether its last step exceeded a tenth of the uncertainty of its motion.
     pub moves: bool,
     /// Whether its last step exceeded the uncertainty of its motion.
@@ -130,7 +140,7 @@ impl StoneState {
             is_roughness_due: false,
             p_with_field: 1.0,
             doubt: 0.0,
-            is_undecided: false,
+            evidence: Evidence::Decides,
             moves: false,
             swings: false,
             effective_freedom: 0.0,

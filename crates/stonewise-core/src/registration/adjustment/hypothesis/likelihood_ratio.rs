@@ -45,12 +45,17 @@ impl LikelihoodRatioTest<'_> {
     /// `inflation`: factor on the points' variances, by which a log likelihood means less. Cost: four fits of
     /// the surface; where the points favour the stone's own motion, sixteen of halves.
     pub fn run(&self, inflation: f64) -> LikelihoodRatio {
-        let log_ratio = self.least(&[&|_| true]);
+        let log_ratio = self.log_ratio();
         let limit = CONTRADICTION * inflation;
         LikelihoodRatio {
             log_ratio,
             is_contradicted: log_ratio > limit && self.least_half() < -limit,
         }
+    }
+
+    /// [`LikelihoodRatio::log_ratio`] alone.
+    pub fn log_ratio(&self) -> f64 {
+        self.least(&[&|_| true])
     }
 
     /// The least log likelihood ratio over the halves of the stone, cut either way through the middle of the first

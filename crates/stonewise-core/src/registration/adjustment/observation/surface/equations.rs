@@ -3,8 +3,8 @@
 //! Stone frame: origin at the epoch-1 centroid, axes (along, up, out) of the wall around it.
 
 use super::cells::{COMPARE_CELLS, CellSums};
-use super::inverse_motion::InverseMotion;
 use super::layout::Layout;
+use super::local_motion::{LocalMotion, Still};
 use super::local_pair::LocalPair;
 use super::patch_fit::PatchFit;
 use super::patch_grid::{Basis, PatchGrid, WeightedPoint};
@@ -77,12 +77,12 @@ pub(crate) fn equations(
     layout: &Layout,
 ) -> Equations {
     let noise = &noise.of_stone(&pair.noise);
-    let motion = InverseMotion::new(motion);
-    let patches = pool_into_patches(pair, &motion, &InverseMotion::new(window), noise, layout);
+    let motion = LocalMotion::new(motion);
+    let patches = pool_into_patches(pair, &motion, &LocalMotion::new(window), noise, layout);
     let mut sum = Equations::zeros(patches.overlap);
     let mut squares = 0.0;
     for patch in patches.list {
-        squares += add_patch(patch, &motion, noise, layout, &mut sum);
+        squares += add_patch(patch, &motion, patches.still, noise, layout, &mut sum);
     }
     if sum.points[1] > 0 {
         sum.rms_m = noise.sigma_m[1] * (squares / sum.points[1] as f64).sqrt();
@@ -93,7 +93,7 @@ pub(crate) fn equations(
 /// [`Equations::deviance`] alone, at `motion`, of all of these points.
 pub(crate) fn deviance(pair: &LocalPair, motion: &StoneVector, noise: &SurfaceNoise, layout: &Layout) -> f64 {
     let noise = &noise.of_stone(&pair.noise);
-    let motion = InverseMotion::new(motion);
+    let motion = LocalMotion::new(motion);
     let of_patch = |PatchPoints { grid, mut epochs, .. }| {
         robust_fit(grid, &mut epochs, noise, layout).map_or(0.0, |fit| {
             let of_points = |(observations, sigma): (&Vec<WeightedPoint>, f64)| -> f64 {
@@ -112,7 +112,8 @@ pub(crate) fn deviance(pair: &LocalPair, motion: &StoneVector, noise: &SurfaceNo
 /// Adds what a patch says to the equations; the sum of the second epoch's weighted squared residuals, in units of sigma.
 fn add_patch(
     PatchPoints { grid, mut epochs, .. }: PatchPoints,
-    motion: &InverseMotion,
+    motion: &LocalMotion,
+    still: Still,
     noise: &SurfaceNoise,
     layout: &Layout,
     sum: &mut Equations,
@@ -140,11 +141,11 @@ fn add_patch(
             // The surface follows each point a little, most at the edge of the points, and takes the slope
             // with it: residuals and slopes are correlated by minus this covariance, which the gradient of
             // the determinant makes good.
-            let bias = motion.jacobian(&o.position, fit.slope_covariance(&o.basis, &inverse));
-            let level = motion.jacobian(&o.position, [0.0; 2]);
+            let bias = motion.jacobian(still, &o.position, fit.slope_covariance(&o.basis, &inverse));
+            let level = motion.jacobian(still, &o.position, [0.0; 2]);
             let bias = Vector9::from(bias) - Vector9::from(level);
             let share = shares.of(epoch, &o.basis);
-            let row = motion.jacobian(&o.position, [hu, hv]).map(|j| share * j);
+            let row = motion.jacobian(still, &o.position, [hu, hv]).map(|j| share * j);
             let j = Vector9::from(row);
             sum.gradient += (j * r - bias * share) * w;
             scatter(&o.basis, w, &row, &mut coupling);
@@ -278,6 +279,7 @@ impl PatchCells {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -349,5 +351,25 @@ mod tests {
             let scale = information.diagonal().max();
             assert!(eigenvalues.min() >= -1e-9 * scale, "{beside}: {eigenvalues}");
         }
+    }
+
+    #[test]
+    fn exchanged_epochs_of_different_noise_say_the_same_of_the_opposite_motion() {
+        let noise = |sigma_m: [f64; 2]| SurfaceNoise { sigma_m, tau_m: 0.01 };
+        let pair = scans(0.0);
+        let unmoved = LocalMotion::new(&StoneVector::zeros());
+        let exchanged = LocalPair::of_points(pair.second_in(&unmoved), pair.first.clone());
+        let moved = StoneVector::from_translation(Vector3::new(0.004, -0.003, 0.002));
+        let back = StoneVector::zeros() - moved;
+        let of_pair = equations(&pair, &moved, &moved, &noise([0.001, 0.005]), &LAYOUT);
+        let of_exchanged = equations(&exchanged, &back, &back, &noise([0.005, 0.001]), &LAYOUT);
+
+        let apart = (of_pair.deviance - of_exchanged.deviance).abs();
+        assert!(apart < 1e-6 * of_pair.deviance.abs(), "{apart}");
+        let [one, other] =
+            [&of_pair, &of_exchanged].map(|e| e.information.fixed_view::<3, 3>(0, 0).into_owned());
+        assert!((one - other).norm() < 1e-6 * one.norm(), "{one} {other}");
+        let [one, other] = [&of_pair, &of_exchanged].map(|e| e.gradient.fixed_rows::<3>(0).into_owned());
+        assert!((one + other).norm() < 1e-6 * one.norm(), "{one} {other}");
     }
 }

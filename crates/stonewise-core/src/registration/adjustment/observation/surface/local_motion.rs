@@ -1,16 +1,23 @@
-//! A stone's motion undone: the second epoch's points in the place of the first.
+//! A stone's motion, which takes points of one epoch to the place of the other.
 
 use crate::registration::adjustment::stone_vector::StoneVector;
 use nalgebra::{Rotation3, Vector3};
 
-/// Takes points of the second epoch back to where they were in the first.
-pub(crate) struct InverseMotion {
+/// Takes points of the first epoch to where they are in the second, and back.
+pub(crate) struct LocalMotion {
     translation: Vector3<f64>,
     rotation: Rotation3<f64>,
     bending: [f64; 3],
 }
 
-impl InverseMotion {
+/// The epoch whose points stay where they are, while those of the other are moved onto its surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Still {
+    First,
+    Second,
+}
+
+impl LocalMotion {
     pub fn new(motion: &StoneVector) -> Self {
         Self {
             translation: motion.translation(),
@@ -19,36 +26,48 @@ impl InverseMotion {
         }
     }
 
-    /// By how much it moves a point of the second epoch at the stone's centroid along the face.
-    pub fn shift_in_face(&self) -> [f64; 2] {
-        [-self.translation.x, -self.translation.y]
+    /// Where a point of the first epoch is in the second.
+    pub fn apply(&self, p: &[f64; 3]) -> [f64; 3] {
+        let bent = Vector3::new(p[0], p[1], p[2] + self.bend(p[0], p[1]));
+        (self.rotation * bent + self.translation).into()
     }
 
-    /// Where a point of the second epoch was in the first; bending is taken off its height.
+    /// Where a point of the second epoch was in the first.
     pub fn undo(&self, q: &[f64; 3]) -> [f64; 3] {
         let y = self
             .rotation
             .inverse_transform_vector(&(Vector3::from(*q) - self.translation));
-        let [uu, uv, vv] = self.bending;
-        [
-            y.x,
-            y.y,
-            y.z - 0.5 * (uu * y.x * y.x + 2.0 * uv * y.x * y.y + vv * y.y * y.y),
-        ]
+        [y.x, y.y, y.z - self.bend(y.x, y.y)]
     }
 
-    /// Derivative of the residual of a point, now at `p`, with respect to the motion, where the surface has
-    /// these slopes.
-    pub fn jacobian(&self, p: &[f64; 3], slopes: [f64; 2]) -> [f64; 9] {
-        let [u, v, _] = *p;
+    /// Height that bending adds.
+    fn bend(&self, u: f64, v: f64) -> f64 {
         let [uu, uv, vv] = self.bending;
-        let m = self.rotation
-            * Vector3::new(
-                -(slopes[0] + uu * u + uv * v),
-                -(slopes[1] + uv * u + vv * v),
-                1.0,
-            );
-        let arm = self.rotation * Vector3::new(u, v, p[2]);
+        0.5 * (uu * u * u + 2.0 * uv * u * v + vv * v * v)
+    }
+
+    /// Derivative, with respect to the motion, of the residual of a point of the second epoch moved back, or of the
+    /// negative residual of one of the first epoch moved onto the second. The point is now at `p`, where the surface
+    /// has these slopes.
+    pub fn jacobian(&self, still: Still, p: &[f64; 3], slopes: [f64; 2]) -> [f64; 9] {
+        let upright = Vector3::new(-slopes[0], -slopes[1], 1.0);
+        let [uu, uv, vv] = self.bending;
+        // Normal of the surface and arm of the point, turned as in the second epoch; where bending acts, and how much
+        // of it is along the normal.
+        let (m, arm, [u, v], along) = match still {
+            Still::First => {
+                let [u, v, _] = *p;
+                let bent = Vector3::new(uu * u + uv * v, uv * u + vv * v, 0.0);
+                let arm = self.rotation * Vector3::from(*p);
+                (self.rotation * (upright - bent), arm, [u, v], 1.0)
+            }
+            Still::Second => {
+                let arm = Vector3::from(*p) - self.translation;
+                let y = self.rotation.inverse_transform_vector(&arm);
+                let out = self.rotation * Vector3::z();
+                (upright, arm, [y.x, y.y], upright.dot(&out))
+            }
+        };
         let r = m.cross(&arm);
         [
             -m.x,
@@ -57,9 +76,9 @@ impl InverseMotion {
             r.x,
             r.y,
             r.z,
-            -u * u / 2.0,
-            -u * v,
-            -v * v / 2.0,
+            -along * u * u / 2.0,
+            -along * u * v,
+            -along * v * v / 2.0,
         ]
     }
 }
@@ -69,30 +88,54 @@ mod tests {
     use super::*;
     use crate::registration::adjustment::stone_vector::Vector9;
 
+    const AT: [f64; 9] = [0.01, -0.02, 0.03, 0.04, -0.05, 0.06, 0.2, -0.1, 0.3];
+    const POINT: [f64; 3] = [0.11, -0.07, 0.05];
+
+    fn motion(unknowns: &Vector9) -> LocalMotion {
+        LocalMotion::new(&StoneVector::from(*unknowns))
+    }
+
+    #[test]
+    fn undoing_a_motion_brings_a_point_back() {
+        let motion = motion(&Vector9::from(AT));
+        let back = motion.undo(&motion.apply(&POINT));
+        let apart = Vector3::from(back) - Vector3::from(POINT);
+        assert!(apart.norm() < 1e-15, "{apart}");
+    }
+
     #[test]
     fn the_jacobian_is_the_derivative_of_the_residual() {
         // A sloping plane, z = 0.3 u - 0.2 v: the residual is the height above it, its slopes are the same
         // everywhere.
         let slopes = [0.3, -0.2];
-        let at = Vector9::from_column_slice(&[0.01, -0.02, 0.03, 0.04, -0.05, 0.06, 0.2, -0.1, 0.3]);
-        let point = [0.11, -0.07, 0.05];
-        let residual = |unknowns: &Vector9| {
-            let [u, v, z] = InverseMotion::new(&StoneVector::from(*unknowns)).undo(&point);
-            z - slopes[0] * u - slopes[1] * v
-        };
-        let inverse = InverseMotion::new(&StoneVector::from(at));
-        let row = inverse.jacobian(&inverse.undo(&point), slopes);
-        for k in 0..9 {
-            let step = 1e-6;
-            let moved = |by: f64| {
-                let mut unknowns = at;
-                unknowns[k] += by * step;
-                residual(&unknowns)
+        let above = |[u, v, z]: [f64; 3]| z - slopes[0] * u - slopes[1] * v;
+        let at = Vector9::from(AT);
+        for still in [Still::First, Still::Second] {
+            let residual = |unknowns: &Vector9| match still {
+                Still::First => above(motion(unknowns).undo(&POINT)),
+                Still::Second => -above(motion(unknowns).apply(&POINT)),
             };
-            let slope = (moved(1.0) - moved(-1.0)) / (2.0 * step);
-            // Rotation vectors add up to second order in the rotation only.
-            let allowed = if (3..6).contains(&k) { 0.01 } else { 1e-3 };
-            assert!((slope - row[k]).abs() < allowed, "{k}: {slope} {}", row[k]);
+            let now = match still {
+                Still::First => motion(&at).undo(&POINT),
+                Still::Second => motion(&at).apply(&POINT),
+            };
+            let row = motion(&at).jacobian(still, &now, slopes);
+            for k in 0..9 {
+                let step = 1e-6;
+                let moved = |by: f64| {
+                    let mut unknowns = at;
+                    unknowns[k] += by * step;
+                    residual(&unknowns)
+                };
+                let slope = (moved(1.0) - moved(-1.0)) / (2.0 * step);
+                // Rotation vectors add up to second order in the rotation only.
+                let allowed = if (3..6).contains(&k) { 0.01 } else { 1e-3 };
+                assert!(
+                    (slope - row[k]).abs() < allowed,
+                    "{still:?} {k}: {slope} {}",
+                    row[k]
+                );
+            }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The points of a matched stone in the stone's frame.
 
-use super::inverse_motion::InverseMotion;
+use super::local_motion::LocalMotion;
 use super::surface_noise::NoiseFactors;
 use crate::cloud::Cloud;
 use crate::registration::adjustment::stone_vector::StoneVector;
@@ -60,12 +60,9 @@ impl LocalPair {
     /// The points that count where the window moved by `window`, and no others: of the second epoch those in
     /// the window, of both those whose place in the first epoch `keep` takes.
     pub fn counting(&self, window: &StoneVector, keep: impl Fn(&[f64; 3]) -> bool) -> Self {
-        let window = InverseMotion::new(window);
-        let still = InverseMotion::new(&StoneVector::zeros());
-        let second: Vec<[f64; 3]> = self
-            .second_moved_back(&still, &window)
-            .filter(|q| keep(&window.undo(q)))
-            .collect();
+        let window = LocalMotion::new(window);
+        let mut second = self.second_in(&window);
+        second.retain(|q| keep(&window.undo(q)));
         Self {
             first: self.first.iter().filter(|p| keep(p)).copied().collect(),
             labelled: second.len(),
@@ -75,19 +72,16 @@ impl LocalPair {
         }
     }
 
-    /// The second epoch's points in the window, where that moved by `window`, moved back by `motion`.
-    pub fn second_moved_back<'a>(
-        &'a self,
-        motion: &'a InverseMotion,
-        window: &'a InverseMotion,
-    ) -> impl Iterator<Item = [f64; 3]> + 'a {
-        self.second.iter().enumerate().filter_map(move |(i, q)| {
-            let counts = self.window.as_ref().is_none_or(|(part, turn)| {
+    /// The second epoch's points in the window, where that moved by `window`.
+    pub fn second_in(&self, window: &LocalMotion) -> Vec<[f64; 3]> {
+        let counts = |(i, q): &(usize, &[f64; 3])| {
+            self.window.as_ref().is_none_or(|(part, turn)| {
                 let at = turn * Vector3::from(window.undo(q));
-                part.holds(1, &Point3::from(at), i < self.labelled)
-            });
-            counts.then(|| motion.undo(q))
-        })
+                part.holds(1, &Point3::from(at), *i < self.labelled)
+            })
+        };
+        let second = self.second.iter().enumerate().filter(counts);
+        second.map(|(_, q)| *q).collect()
     }
 }
 
@@ -130,8 +124,8 @@ mod tests {
             window: chosen.window.map(Arc::new),
         };
         let local = LocalPair::new(&pair, &frame, NoiseFactors::USUAL);
-        let moved = InverseMotion::new(&StoneVector::from_translation(frame * shift));
-        let counted: Vec<[f64; 3]> = local.second_moved_back(&moved, &moved).collect();
+        let moved = LocalMotion::new(&StoneVector::from_translation(frame * shift));
+        let counted: Vec<[f64; 3]> = local.second_in(&moved).iter().map(|q| moved.undo(q)).collect();
         assert_eq!(counted.len(), local.first.len());
         let largest = |points: &[[f64; 3]]| {
             points
@@ -139,8 +133,8 @@ mod tests {
                 .fold(0.0, |m: f64, p| m.max(p[0].abs()).max(p[1].abs()))
         };
         assert!((largest(&counted) - largest(&local.first)).abs() < 1e-6);
-        let still = InverseMotion::new(&StoneVector::zeros());
-        let left_behind = local.second_moved_back(&moved, &still).count();
+        let unmoved = LocalMotion::new(&StoneVector::zeros());
+        let left_behind = local.second_in(&unmoved).len();
         assert!(
             left_behind + 200 < counted.len(),
             "{left_behind} {}",

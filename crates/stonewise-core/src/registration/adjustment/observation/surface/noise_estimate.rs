@@ -1,7 +1,7 @@
 //! Noise of the points and roughness of the stones, by restricted maximum likelihood.
 
-use super::inverse_motion::InverseMotion;
 use super::layout::Layout;
+use super::local_motion::LocalMotion;
 use super::local_pair::LocalPair;
 use super::patch_fit::PatchFit;
 use super::patch_grid::WeightedPoint;
@@ -111,7 +111,7 @@ fn sampled(sample: &[(&LocalPair, StoneVector)], noise: &SurfaceNoise, layout: &
     let all: Vec<PatchPoints> = sample
         .par_iter()
         .map(|(pair, x)| {
-            let motion = InverseMotion::new(x);
+            let motion = LocalMotion::new(x);
             pool_into_patches(pair, &motion, &motion, noise, layout).list
         })
         .collect::<Vec<_>>()

@@ -1,20 +1,21 @@
 //! The face of a stone cut into patches, each with the points of both epochs.
 
 use super::cells::{COMPARE_CELLS, CellSums};
-use super::inverse_motion::InverseMotion;
 use super::layout::Layout;
+use super::local_motion::{LocalMotion, Still};
 use super::local_pair::LocalPair;
 use super::patch_grid::{PatchGrid, WeightedPoint};
 use super::surface_noise::SurfaceNoise;
+use std::borrow::Cow;
 
 /// Points in each epoch that a patch needs: twice the unknowns of a plane, for a fit whose outliers can be detected.
 const PATCH_POINTS: usize = 12;
-/// Width by which a face is widened, in cells: points that noise moved beyond the first epoch's outline still
+/// Width by which a face is widened, in cells: points that noise moved beyond the outline of the face still
 /// count.
 const MARGIN_CELLS: f64 = 2.0;
-/// The grid of cells follows the second epoch's points where these weigh more by this factor. How well a surface
-/// of cells follows points depends on where the cells lie between them, and sharp points notice: a motion of
-/// these over the grid would seem likely or unlikely by itself.
+/// Factor by which the second epoch's points must outweigh those of the first for the surface to lie in the second
+/// epoch. The fit depends on where points lie between the cells, most for sharp points: if these moved over the cells,
+/// some motions would seem likelier by that alone.
 const HEAVIER: f64 = 2.0;
 /// Shortest side of a patch, in cells: a cubic spline's four coefficients.
 const LEAST_CELLS: usize = 4;
@@ -30,27 +31,38 @@ pub(crate) struct PatchPoints {
 pub(crate) struct Patches {
     pub list: Vec<PatchPoints>,
     pub overlap: f64,
+    /// Whose points stay where they are.
+    pub still: Still,
 }
 
-/// Cuts the face of the first epoch into patches and pools the points of both epochs in each.
+/// Cuts the face of one epoch into patches and pools the points of both epochs in each, those of the other epoch moved.
 pub(crate) fn pool_into_patches(
     pair: &LocalPair,
-    motion: &InverseMotion,
-    window: &InverseMotion,
+    motion: &LocalMotion,
+    window: &LocalMotion,
     noise: &SurfaceNoise,
     layout: &Layout,
 ) -> Patches {
-    let second: Vec<[f64; 3]> = pair.second_moved_back(motion, window).collect();
-    let epochs = [&pair.first, &second];
-    let [first, moving] = [0, 1].map(|e| epochs[e].len() as f64 / noise.sigma_m[e].powi(2));
-    let anchor = match moving > HEAVIER * first {
-        true => motion.shift_in_face(),
-        false => [0.0; 2],
+    let mut second = pair.second_in(window);
+    let weight = |count: usize, epoch: usize| count as f64 / noise.sigma_m[epoch].powi(2);
+    let still = match weight(second.len(), 1) > HEAVIER * weight(pair.first.len(), 0) {
+        true => Still::Second,
+        false => Still::First,
     };
-    let Some(cuts) = Cuts::new(&pair.first, anchor, layout) else {
+    let mut first = Cow::Borrowed(&pair.first);
+    match still {
+        Still::First => second.iter_mut().for_each(|q| *q = motion.undo(q)),
+        Still::Second => first.to_mut().iter_mut().for_each(|p| *p = motion.apply(p)),
+    }
+    let cuts = Cuts::new(&first, layout).and_then(|of_first| match still {
+        Still::First => Some((of_first.clone(), of_first)),
+        Still::Second => Some((of_first, Cuts::new(&second, layout)?)),
+    });
+    let Some((of_first, cuts)) = cuts else {
         return Patches {
             list: Vec::new(),
             overlap: 0.0,
+            still,
         };
     };
     let mut list: Vec<PatchPoints> = (0..cuts.count[0] * cuts.count[1])
@@ -61,8 +73,8 @@ pub(crate) fn pool_into_patches(
         })
         .collect();
 
-    let mut compare = CellSums::new(cuts.low, cuts.high, COMPARE_CELLS * layout.cell_m);
-    for (epoch, points) in epochs.into_iter().enumerate() {
+    let mut compare = CellSums::new(of_first.low, of_first.high, COMPARE_CELLS * layout.cell_m);
+    for (epoch, points) in [&*first, &second].into_iter().enumerate() {
         for p in points {
             compare.count(epoch, p);
             if let Some(patch) = cuts.patch_at(p) {
@@ -76,10 +88,12 @@ pub(crate) fn pool_into_patches(
     Patches {
         list,
         overlap: compare.overlap(),
+        still,
     }
 }
 
 /// How a face is cut into patches of equal size.
+#[derive(Clone)]
 struct Cuts {
     low: [f64; 2],
     high: [f64; 2],
@@ -89,8 +103,8 @@ struct Cuts {
 }
 
 impl Cuts {
-    /// `None` without points. `anchor`: by how much the grid of cells is moved, up to whole cells.
-    fn new(face: &[[f64; 3]], anchor: [f64; 2], layout: &Layout) -> Option<Self> {
+    /// `None` without points.
+    fn new(face: &[[f64; 3]], layout: &Layout) -> Option<Self> {
         let margin = MARGIN_CELLS * layout.cell_m;
         let mut low = [f64::INFINITY; 2];
         let mut high = [f64::NEG_INFINITY; 2];
@@ -99,11 +113,6 @@ impl Cuts {
                 low[a] = low[a].min(p[a] - margin);
                 high[a] = high[a].max(p[a] + margin);
             }
-        }
-        for a in 0..2 {
-            let to_anchor = (anchor[a] / layout.cell_m).fract() * layout.cell_m;
-            low[a] += to_anchor;
-            high[a] += to_anchor;
         }
         let side = layout.patch_cells.max(LEAST_CELLS) as f64 * layout.cell_m;
         let count = [0, 1].map(|a| ((high[a] - low[a]) / side).ceil().max(1.0) as usize);
