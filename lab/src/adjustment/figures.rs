@@ -203,6 +203,10 @@ pub fn print_loose(trial: &Trial, pairs: &[PairPoints], results: &[PairResult]) 
             continue;
         }
         let face = FaceFrame::from_normal(&truth.normal).face_from_world() * 1e3;
+        let sds = |covariance: Matrix3<f64>| {
+            let covariance = face * covariance * face.transpose();
+            [0, 1, 2].map(|a| covariance[(a, a)].max(0.0).sqrt())
+        };
         let bound = trial.bounds.get(&result.first.0).map_or([f64::NAN; 2], |b| b[0]);
         let head = format!(
             "      stone {:3} loose {:5} called {called:5}, {} points, bound {:.2?} mm, moved by itself {:5.1?}",
@@ -214,10 +218,12 @@ pub fn print_loose(trial: &Trial, pairs: &[PairPoints], results: &[PairResult]) 
         );
         match &result.motion {
             Ok(m) => println!(
-                "{head}, found {:5.1?} +- {:.1?}, p {:.1e}",
+                "{head}, found {:5.1?} +- {:.1?}, p {:.1e}; error of the motion {:5.2?} +- {:.2?}",
                 (face * m.relative).as_slice(),
-                [0, 1, 2].map(|a| { (face * m.relative_covariance * face.transpose())[(a, a)].sqrt() }),
-                m.own_motion_p
+                sds(m.relative_covariance),
+                m.own_motion_p,
+                (face * (m.displacement - truth.displacement)).as_slice(),
+                sds(m.covariance.fixed_view::<3, 3>(0, 0).into_owned()),
             ),
             Err(e) => println!("{head}: {e}"),
         }
