@@ -15,7 +15,7 @@ const OUTSIDE: f64 = 0.05;
 /// the line that stands for one cuts off the corners.
 const ACROSS: f64 = 0.1;
 /// Probability that a stone is loose if its points favour its own motion but one of its halves contradicts it: masks
-/// that took in something else on one side are about twice as frequent as loose stones.
+/// that took in something else on one side are taken to be twice as frequent as loose stones.
 const CONTRADICTED: f64 = 0.3;
 
 /// A stone's motion with its looseness averaged out, in its frame.
@@ -90,29 +90,29 @@ impl Adjustment {
         };
         let own = self.prior.own_variances();
 
-        let tied = |probability: f64| {
-            let here = case(prediction, &equations.with_field, &own, slide_m2);
-            let Some(across_m) = across_m else {
-                return vec![here.of_probability(probability)];
-            };
-            let beyond = case(&prediction.moved(across_m), &equations.with_field, &own, slide_m2);
-            let log_odds = beyond.log_evidence - here.log_evidence + (ACROSS / (1.0 - ACROSS)).ln();
-            let p_across = 1.0 / (1.0 + (-log_odds).exp());
-            vec![
-                here.of_probability(probability * (1.0 - p_across)),
-                beyond.of_probability(probability * p_across),
-            ]
+        let here = case(prediction, &equations.with_field, &own, slide_m2);
+        let tied = match across_m {
+            None => vec![here],
+            Some(across_m) => {
+                let beyond = case(&prediction.moved(across_m), &equations.with_field, &own, slide_m2);
+                let log_odds = beyond.log_evidence - here.log_evidence + (ACROSS / (1.0 - ACROSS)).ln();
+                let p_across = 1.0 / (1.0 + (-log_odds).exp());
+                vec![
+                    here.of_probability(1.0 - p_across),
+                    beyond.of_probability(p_across),
+                ]
+            }
         };
+        let with_neighbours = Estimate::of(&tied);
 
         let p_loose = self.p_loose(stone);
         let Some(at_own) = equations.on_own.as_ref().filter(|_| stone.on_own.is_some()) else {
-            let tied = Estimate::of(&tied(1.0));
             let factor = widening(p_loose);
             return Estimate {
-                covariance: tied.covariance * factor,
-                relative_covariance: tied.relative_covariance * factor,
+                covariance: with_neighbours.covariance * factor,
+                relative_covariance: with_neighbours.relative_covariance * factor,
                 missed: p_loose,
-                ..tied
+                ..with_neighbours
             };
         };
         let p_wrong = stone.p_wrong();
@@ -120,13 +120,17 @@ impl Adjustment {
         let photos = self.observed_by_photos(i, Moving::WithField);
 
         let without_clouds = photos.unwrap_or_else(NormalEquations::nothing);
-        let mut cases = tied(p_tied);
+        let scaled = |case: Case| Case {
+            probability: p_tied * case.probability,
+            ..case
+        };
+        let mut cases: Vec<Case> = tied.into_iter().map(scaled).collect();
         let loose = case(prediction, at_own, &self.prior.loose_variances(), 0.0);
         let wrong = case(prediction, &without_clouds, &own, slide_m2);
         cases.extend([loose.of_probability(p_loose), wrong.of_probability(p_wrong)]);
         let mixture = Estimate::of(&cases);
         match stone.evidence {
-            Evidence::Contradictory => mixture.about(Estimate::of(&tied(1.0))),
+            Evidence::Contradictory => mixture.about(with_neighbours),
             Evidence::TooWeak | Evidence::Decides => mixture,
         }
     }

@@ -286,13 +286,23 @@ impl Adjustment {
 mod tests {
     use super::super::observation::photo::{BiasWeights, PhotoModel, PoseInfluence, StonePhotos};
     use super::super::significance::test_stones;
+    use super::super::survey::Points;
     use super::super::testing::{COLUMNS, begun, wall};
     use super::*;
-    use crate::registration::points::MemoryPairs;
+    use crate::registration::points::{MemoryPairs, PairSource};
     use nalgebra::Vector3;
+    use std::fmt::Debug;
 
     fn is_right(stone: usize) -> bool {
         stone as u32 % COLUMNS >= COLUMNS / 2
+    }
+
+    /// The solution with the weights that follow from it, where the stones are.
+    fn solved<S: PairSource<Error: Debug>>(adjustment: &mut Adjustment, points: &Points<S>) -> Solution {
+        adjustment.evaluate(points).unwrap();
+        let equations = adjustment.equations();
+        let field = adjustment.solve_and_reweight(&equations).unwrap();
+        Solution { equations, field }
     }
 
     /// Whether a wall is parted whose right half moved by these by its points and by its photos.
@@ -302,10 +312,8 @@ mod tests {
         let (mut adjustment, points) = begun(&source);
         adjustment.estimate_noise(&points.sample);
         for _ in 0..3 {
-            adjustment.evaluate(&points).unwrap();
-            let equations = adjustment.equations();
-            let field = adjustment.solve_and_reweight(&equations).unwrap();
-            adjustment.step(&Solution { equations, field });
+            let solution = solved(&mut adjustment, &points);
+            adjustment.step(&solution);
         }
         // Two tenths of a millimetre in the face, nothing across it.
         let information = Matrix3::from_diagonal(&Vector3::new(2.5e7, 2.5e7, 1.0));
@@ -347,10 +355,7 @@ mod tests {
             adjustment.estimate_noise(&points.sample);
             let mut last = None;
             for _ in 0..8 {
-                adjustment.evaluate(&points).unwrap();
-                let equations = adjustment.equations();
-                let field = adjustment.solve_and_reweight(&equations).unwrap();
-                let solution = Solution { equations, field };
+                let solution = solved(&mut adjustment, &points);
                 adjustment.step(&solution);
                 last = Some(solution);
             }
@@ -384,10 +389,8 @@ mod tests {
         let (mut adjustment, points) = begun(&source);
         adjustment.estimate_noise(&points.sample);
         for _ in 0..8 {
-            adjustment.evaluate(&points).unwrap();
-            let equations = adjustment.equations();
-            let field = adjustment.solve_and_reweight(&equations).unwrap();
-            adjustment.step(&Solution { equations, field });
+            let solution = solved(&mut adjustment, &points);
+            adjustment.step(&solution);
         }
         adjustment.evaluate(&points).unwrap();
         adjustment.stones[torn].ratio.is_contradicted = true;

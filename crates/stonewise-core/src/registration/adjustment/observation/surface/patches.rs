@@ -54,17 +54,19 @@ pub(crate) fn pool_into_patches(
         Still::First => second.iter_mut().for_each(|q| *q = motion.undo(q)),
         Still::Second => first.to_mut().iter_mut().for_each(|p| *p = motion.apply(p)),
     }
-    let cuts = Cuts::new(&first, layout).and_then(|of_first| match still {
-        Still::First => Some((of_first.clone(), of_first)),
-        Still::Second => Some((of_first, Cuts::new(&second, layout)?)),
-    });
-    let Some((of_first, cuts)) = cuts else {
+    let of_first = widened(&first, layout);
+    let face = match still {
+        Still::First => of_first,
+        Still::Second => widened(&second, layout),
+    };
+    let (Some([low, high]), Some(face)) = (of_first, face) else {
         return Patches {
             list: Vec::new(),
             overlap: 0.0,
             still,
         };
     };
+    let cuts = Cuts::new(face, layout);
     let mut list: Vec<PatchPoints> = (0..cuts.count[0] * cuts.count[1])
         .map(|patch| PatchPoints {
             grid: cuts.grid(patch, layout.cell_m),
@@ -73,7 +75,7 @@ pub(crate) fn pool_into_patches(
         })
         .collect();
 
-    let mut compare = CellSums::new(of_first.low, of_first.high, COMPARE_CELLS * layout.cell_m);
+    let mut compare = CellSums::new(low, high, COMPARE_CELLS * layout.cell_m);
     for (epoch, points) in [&*first, &second].into_iter().enumerate() {
         for p in points {
             compare.count(epoch, p);
@@ -92,36 +94,37 @@ pub(crate) fn pool_into_patches(
     }
 }
 
+/// The corners of a face, widened; `None` without points.
+fn widened(face: &[[f64; 3]], layout: &Layout) -> Option<[[f64; 2]; 2]> {
+    let margin = MARGIN_CELLS * layout.cell_m;
+    let mut low = [f64::INFINITY; 2];
+    let mut high = [f64::NEG_INFINITY; 2];
+    for p in face {
+        for a in 0..2 {
+            low[a] = low[a].min(p[a] - margin);
+            high[a] = high[a].max(p[a] + margin);
+        }
+    }
+    (!face.is_empty()).then_some([low, high])
+}
+
 /// How a face is cut into patches of equal size.
-#[derive(Clone)]
 struct Cuts {
     low: [f64; 2],
-    high: [f64; 2],
     count: [usize; 2],
     /// Sides of a patch, metres.
     step: [f64; 2],
 }
 
 impl Cuts {
-    /// `None` without points.
-    fn new(face: &[[f64; 3]], layout: &Layout) -> Option<Self> {
-        let margin = MARGIN_CELLS * layout.cell_m;
-        let mut low = [f64::INFINITY; 2];
-        let mut high = [f64::NEG_INFINITY; 2];
-        for p in face {
-            for a in 0..2 {
-                low[a] = low[a].min(p[a] - margin);
-                high[a] = high[a].max(p[a] + margin);
-            }
-        }
+    fn new([low, high]: [[f64; 2]; 2], layout: &Layout) -> Self {
         let side = layout.patch_cells.max(LEAST_CELLS) as f64 * layout.cell_m;
         let count = [0, 1].map(|a| ((high[a] - low[a]) / side).ceil().max(1.0) as usize);
-        (!face.is_empty()).then(|| Self {
+        Self {
             low,
-            high,
             count,
             step: [0, 1].map(|a| (high[a] - low[a]) / count[a] as f64),
-        })
+        }
     }
 
     fn patch_at(&self, p: &[f64; 3]) -> Option<usize> {
