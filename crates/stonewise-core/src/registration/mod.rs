@@ -9,6 +9,7 @@ mod deformation;
 mod gicp;
 mod moved;
 pub mod observers;
+mod octave_patches;
 pub mod photos;
 pub(crate) mod points;
 

@@ -19,7 +19,7 @@ pub(super) fn joint_motions(
     solution: &Solution,
     results: &[PairResult],
     estimates: &[Result<Estimate, MotionFailure>],
-    octaves: &Octaves,
+    (octaves, poses): (&Octaves, DMatrix<f64>),
 ) -> JointMotions {
     let one = octaves.one();
     let stone = |i: usize| {
@@ -98,10 +98,7 @@ pub(super) fn joint_motions(
         stones,
         edges: graph.edges.iter().map(|e| (e.low, e.high)).collect(),
         information,
-        poses: adjustment
-            .photos
-            .as_ref()
-            .map_or_else(|| DMatrix::zeros(0, 0), |p| p.of_poses().clone()),
+        poses,
         octaves: adjustment.octaves(),
         step_m: adjustment.step_m().unwrap_or(f64::INFINITY),
     }

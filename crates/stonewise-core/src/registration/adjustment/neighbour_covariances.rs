@@ -10,7 +10,7 @@ use super::tracking::PhotoPart;
 use crate::linalg::without_negative;
 use crate::statistics::{UPPER_95, student_95};
 use crate::stone::{MotionFailure, NeighbourCovariance, PairResult};
-use nalgebra::Matrix3;
+use nalgebra::{DMatrix, Matrix3};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -35,7 +35,7 @@ pub(crate) fn neighbour_covariances(
     solution: &Solution,
     results: &[PairResult],
     estimates: &[Result<Estimate, MotionFailure>],
-    octaves: &Octaves,
+    (octaves, poses): (&Octaves, &DMatrix<f64>),
 ) -> Vec<NeighbourCovariance> {
     let tails = tail_factor(adjustment.params.tie_freedom);
     let octave = octaves.one() + octaves.of_stone();
@@ -44,7 +44,7 @@ pub(crate) fn neighbour_covariances(
         .enumerate()
         .map(|(i, estimate)| {
             let estimate = estimate.as_ref().ok().filter(|_| results[i].motion.is_ok())?;
-            Some(Measured::new(adjustment, i, estimate, &octave))
+            Some(Measured::new(adjustment, i, estimate, (&octave, poses)))
         })
         .collect();
 
@@ -62,7 +62,7 @@ pub(crate) fn neighbour_covariances(
                 + b.octave
                 + a.least_photo_error
                 + b.least_photo_error
-                + of_poses([a, b]),
+                + of_poses([a, b], poses),
         })
     };
 
@@ -85,7 +85,13 @@ struct Measured<'a> {
 }
 
 impl<'a> Measured<'a> {
-    fn new(adjustment: &'a Adjustment, i: usize, estimate: &'a Estimate, octave: &Matrix3<f64>) -> Self {
+    /// `octave`: of the errors that points share; `poses`: of the poses' errors.
+    fn new(
+        adjustment: &'a Adjustment,
+        i: usize,
+        estimate: &'a Estimate,
+        (octave, poses): (&Matrix3<f64>, &DMatrix<f64>),
+    ) -> Self {
         let face_from_world = &adjustment.prior.graph.nodes[i].face_from_world;
         let in_world = |covariance: &Matrix3<f64>| face_from_world.transpose() * covariance * face_from_world;
         let photos = adjustment.photo_part(i);
@@ -99,7 +105,7 @@ impl<'a> Measured<'a> {
             translation: in_world(&translation),
             octave: in_world(octave),
             least_photo_error: of_photos(&|part| part.least_error()),
-            of_poses: of_photos(&|part| part.pose_covariance(part)),
+            of_poses: of_photos(&|part| part.pose_covariance(part, poses)),
             photos,
         }
     }
@@ -121,9 +127,9 @@ fn between([a, b]: [&Measured; 2], field: &Matrix9) -> Matrix3<f64> {
 }
 
 /// Covariance of the difference of two displacements that errors of the poses cause, world.
-fn of_poses([a, b]: [&Measured; 2]) -> Matrix3<f64> {
+fn of_poses([a, b]: [&Measured; 2], poses: &DMatrix<f64>) -> Matrix3<f64> {
     let local = match [&a.photos, &b.photos] {
-        [Some(first), Some(second)] => first.pose_covariance(second),
+        [Some(first), Some(second)] => first.pose_covariance(second, poses),
         _ => Matrix3::zeros(),
     };
     let between = a.face_from_world.transpose() * local * b.face_from_world;
@@ -136,7 +142,7 @@ mod tests {
     use crate::registration::adjustment::estimate::by_field;
     use crate::registration::adjustment::observation::NormalEquations;
     use crate::registration::adjustment::stone_vector::{StoneVector, Vector9};
-    use nalgebra::{DMatrix, Rotation3};
+    use nalgebra::Rotation3;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 

@@ -5,7 +5,7 @@ use super::state::Adjustment;
 use super::tracking::PhotoPart;
 use crate::geometry::SmallMotion;
 use crate::statistics::{UPPER_95, component_median, quantile};
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Share of the stones by which the scatter of their motions is measured.
@@ -94,9 +94,9 @@ impl Octaves {
 
     /// Covariance over all octaves, against the other epoch; `photos`: their part in the motion.
     ///
-    /// Photos do not share the errors of the points, but over one octave: what is wrong over the length of a
-    /// stone, a mask or a stain, they see like the points. Light shifts neighbours alike, so that the least bias
-    /// of appearance is shared over all octaves, too.
+    /// Photos share the errors of the points only through the poses, and over one octave: what is wrong over the
+    /// length of a stone, a mask or a stain, they see like the points. Light shifts neighbours alike, so that the
+    /// least bias of appearance is shared over all octaves, too.
     pub fn over_all(&self, photos: Option<&PhotoPart>) -> Matrix3<f64> {
         let octaves = |count: f64| Matrix3::identity() * (count * self.expected_m2);
         self.shown(&match photos {
@@ -105,6 +105,13 @@ impl Octaves {
             }
             None => octaves(self.count),
         })
+    }
+
+    /// Covariance of the errors of the photos' poses, with what follows the errors of the points; of no unknowns where
+    /// photos take no part.
+    pub fn of_poses(&self, adjustment: &Adjustment) -> DMatrix<f64> {
+        let photos = adjustment.photos.as_ref();
+        photos.map_or_else(|| DMatrix::zeros(0, 0), |p| p.of_poses(&self.one().diagonal()))
     }
 
     /// What the motions show of a covariance of such errors.

@@ -18,7 +18,7 @@ use super::state::Adjustment;
 use super::stone_vector::Matrix9;
 use crate::geometry::Rigid3;
 use crate::stone::{MotionFailure, NeighbourCovariance, PairResult, StoneMotion};
-use nalgebra::{Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 /// A cell whose epochs differ by this many times the expected variance shows two surfaces (1 in 400 by
@@ -88,15 +88,20 @@ impl Found {
             let estimate = estimates[i].as_ref().ok().filter(|_| !tested[i].is_loose)?;
             Some((estimate.mean + adjustment.prior.common_in(i)).translation())
         });
-        let mut results = results(adjustment, solution, &tested, &estimates, &octaves);
+        let poses = octaves.of_poses(adjustment);
+        let mut results = results(adjustment, solution, &tested, &estimates, (&octaves, &poses));
         leave_out_covered(&covered, &mut results);
         refuse_unconfirmed(adjustment, &mut results);
         Self {
             breaks: find_breaks(adjustment, &solution.field.state, |i| tested[i].is_loose),
-            neighbours: neighbour_covariances(adjustment, solution, &results, &estimates, &octaves),
+            neighbours: neighbour_covariances(adjustment, solution, &results, &estimates, (&octaves, &poses)),
             common_covariance: common_covariance(adjustment, solution, &shared),
             joint: Some(joint_motions(
-                adjustment, solution, &results, &estimates, &octaves,
+                adjustment,
+                solution,
+                &results,
+                &estimates,
+                (&octaves, poses),
             )),
             results,
         }
@@ -142,7 +147,7 @@ fn results(
     solution: &Solution,
     tested: &[Tested],
     estimates: &[Result<Estimate, MotionFailure>],
-    octaves: &Octaves,
+    (octaves, poses): (&Octaves, &DMatrix<f64>),
 ) -> Vec<PairResult> {
     let shared = adjustment.shared_variances(1.0);
     let bodies = bodies(adjustment);
@@ -155,7 +160,14 @@ fn results(
             motion: match estimate {
                 Err(failure) => Err(failure.clone()),
                 Ok(estimate) => {
-                    let motion = motion(adjustment, i, solution, tested[i], estimate, (&shared, octaves));
+                    let motion = motion(
+                        adjustment,
+                        i,
+                        solution,
+                        tested[i],
+                        estimate,
+                        (&shared, octaves, poses),
+                    );
                     observable(motion, adjustment.params.max_sd_m).and_then(|m| reachable(adjustment, i, m))
                 }
             },
@@ -230,7 +242,7 @@ fn motion(
     solution: &Solution,
     tested: Tested,
     estimate: &Estimate,
-    (shared, octaves): (&[f64; 9], &Octaves),
+    (shared, octaves, poses): (&[f64; 9], &Octaves, &DMatrix<f64>),
 ) -> StoneMotion {
     let node = &adjustment.prior.graph.nodes[i];
     let world = node.face_from_world.transpose();
@@ -248,7 +260,7 @@ fn motion(
     translation += octaves.over_all(photos.as_ref()) + octaves.of_stone();
 
     if let Some(photos) = photos {
-        translation += photos.pose_covariance(&photos);
+        translation += photos.pose_covariance(&photos, poses);
     }
     let covariance = in_world(&local, &world);
     let prediction = &solution.field.from_others[i];

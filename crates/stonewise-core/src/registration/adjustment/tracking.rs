@@ -9,13 +9,13 @@ use super::observation::photo::{
 };
 use super::solution::Solution;
 use super::state::{Adjustment, StoneState};
-use super::stone_vector::{Matrix9, StoneVector, Vector9};
+use super::stone_vector::{Matrix9, StoneVector};
 use super::survey::Points;
 use crate::progress::Interrupted;
 use crate::registration::photos::{FaceMotion, PhotoSource, PhotoStatus, Track, Tracker};
 use crate::registration::points::PairSource;
 use crate::stone::PairResult;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
 
 /// Rotation and bending of a stone before its points are looked at, radians and 1/m: ten times what loose
@@ -24,9 +24,41 @@ const OPEN: [f64; 2] = [0.2, 1.0];
 /// Standard deviations of the clouds' place within which a stone is sought.
 const SEARCH_SDS: f64 = 3.0;
 
+/// What is known of a stone's rotation and bending before its points are looked at: information, and information times
+/// them, about the common motion.
+struct Turn {
+    information: Matrix6<f64>,
+    vector: Vector6<f64>,
+}
+
+impl Turn {
+    /// Next to nothing.
+    fn open() -> Self {
+        let [turn, bend] = OPEN.map(|sd| sd.powi(-2));
+        Self {
+            information: Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, bend, bend, bend)),
+            vector: Vector6::zeros(),
+        }
+    }
+
+    /// What the other stones predict of a stone that moves with them.
+    fn predicted(prediction: &Prediction, own: &[f64; 9]) -> Option<Self> {
+        let mut covariance = Matrix6::from_diagonal(&Vector6::from_fn(|k, _| own[3 + k]));
+        let mut rotation = covariance.fixed_view_mut::<3, 3>(0, 0);
+        rotation += prediction.covariance.fixed_view::<3, 3>(3, 3);
+        let information = covariance.cholesky()?.inverse();
+        let mut mean = Vector6::zeros();
+        mean.fixed_rows_mut::<3>(0)
+            .copy_from(&prediction.mean.fixed_rows::<3>(3));
+        Some(Self {
+            information,
+            vector: information * mean,
+        })
+    }
+}
+
 /// The part of the photos in a stone's displacement.
 pub(crate) struct PhotoPart<'a> {
-    model: &'a PhotoModel,
     stone: &'a StonePhotos,
     /// Share of the photos in the displacement.
     share: Matrix3<f64>,
@@ -36,8 +68,11 @@ impl PhotoPart<'_> {
     /// Covariance between two stones' displacements that errors of the poses cause, each stone in its own
     /// frame; with itself, the covariance of one displacement. The stones share these errors, so no number of
     /// stones averages them away.
-    pub fn pose_covariance(&self, other: &Self) -> Matrix3<f64> {
-        self.share * self.model.pose_covariance(self.stone, other.stone) * other.share.transpose()
+    ///
+    /// `poses`: covariance of the poses' errors.
+    pub fn pose_covariance(&self, other: &Self, poses: &DMatrix<f64>) -> Matrix3<f64> {
+        let by_photos = self.stone.by_poses.covariance_with(&other.stone.by_poses, poses);
+        self.share * by_photos * other.share.transpose()
     }
 
     /// The unknowns of the poses, and the stone's displacement, in its frame, by each of them.
@@ -52,7 +87,7 @@ impl PhotoPart<'_> {
     }
 
     /// What is left of a covariance of errors of the points in the stone's displacement, in its frame: the
-    /// photos do not share them.
+    /// photos share them only through the poses.
     pub fn left_of(&self, of_points: &Matrix3<f64>) -> Matrix3<f64> {
         let rest = self.share_of_points();
         rest * of_points * rest.transpose()
@@ -118,7 +153,7 @@ impl Adjustment {
             }
         }
 
-        let stones = self.stones_in_photos(|i| tracks[i].place);
+        let stones = self.stones_in_photos(|i| tracks[i].place, |_| None);
         self.photos = Some(PhotoModel::new(
             photos.params().clone(),
             photos.photos(),
@@ -135,8 +170,14 @@ impl Adjustment {
         let Some(mut photos) = self.photos.take() else {
             return;
         };
-        let stones = self.stones_in_photos(|i| photos.place(i));
-        photos.update(&stones, self.prior.components.appearance_m());
+        let own = self.prior.own_variances();
+        let turn = |i: usize| {
+            let prediction = &last?.field.from_others[i];
+            (self.stones[i].moving() == Moving::WithField).then(|| Turn::predicted(prediction, &own))?
+        };
+        let stones = self.stones_in_photos(|i| photos.place(i), turn);
+        let lengths = (self.step_m().unwrap_or(f64::INFINITY), self.octaves());
+        photos.update(&stones, self.prior.components.appearance_m(), lengths);
         if let Some(solution) = last {
             let shared = self.shared_variances(1.0);
             photos.weigh(|i, stone, moving| {
@@ -198,8 +239,7 @@ impl Adjustment {
     /// The part of the photos in a stone's displacement; `None` where they show nothing of it, or where
     /// neither photos nor points determine it.
     pub fn photo_part(&self, i: usize) -> Option<PhotoPart<'_>> {
-        let model = self.photos.as_ref()?;
-        let stone = model.stone(i)?;
+        let stone = self.photos.as_ref()?.stone(i)?;
         let (information, _, _) =
             stone.with_bias(self.prior.components.appearance_m(), self.stones[i].moving());
         let by_clouds = self
@@ -207,7 +247,7 @@ impl Adjustment {
             .and_then(|c| c.covariance.try_inverse())
             .unwrap_or_else(Matrix3::zeros);
         let share = (by_clouds + information).try_inverse()? * information;
-        Some(PhotoPart { model, stone, share })
+        Some(PhotoPart { stone, share })
     }
 
     /// Whether a stone's photos alone make it more probable that it is loose than that it moves as
@@ -237,11 +277,21 @@ impl Adjustment {
         Some(report)
     }
 
-    fn stones_in_photos(&self, place: impl Fn(usize) -> [f64; 2]) -> Vec<StoneInPhotos> {
+    /// `turn`: what is known of a stone's rotation and bending; `None`: nothing.
+    fn stones_in_photos(
+        &self,
+        place: impl Fn(usize) -> [f64; 2],
+        turn: impl Fn(usize) -> Option<Turn>,
+    ) -> Vec<StoneInPhotos> {
         let of_stone = |(i, node): (usize, &super::field::Node)| StoneInPhotos {
             centroid: node.centroid,
             face_from_world: node.face_from_world,
-            clouds: self.cloud_motion(i, place(i)),
+            clouds: self.cloud_motion_about(
+                i,
+                &self.stones[i].with_field,
+                place(i),
+                &turn(i).unwrap_or_else(Turn::open),
+            ),
         };
         self.prior.graph.nodes.iter().enumerate().map(of_stone).collect()
     }
@@ -249,14 +299,14 @@ impl Adjustment {
     /// The displacement in the face by the stone's own points alone, about the motion that it more probably
     /// made.
     fn shift_by_clouds(&self, i: usize, place: [f64; 2]) -> Option<FaceShift> {
-        let by_clouds = self.cloud_motion_about(i, self.stones[i].more_probable(), place)?;
+        let by_clouds = self.cloud_motion_about(i, self.stones[i].more_probable(), place, &Turn::open())?;
         let covariance = by_clouds.covariance.fixed_view::<2, 2>(0, 0).into_owned();
         FaceShift::new(&by_clouds.mean.xy(), &covariance)
     }
 
     /// The displacement of a place on a stone's face by its own points alone; `None` where they show none.
     pub fn cloud_motion(&self, i: usize, place: [f64; 2]) -> Option<CloudMotion> {
-        self.cloud_motion_about(i, &self.stones[i].with_field, place)
+        self.cloud_motion_about(i, &self.stones[i].with_field, place, &Turn::open())
     }
 
     /// The displacement about one of the stone's motions.
@@ -265,20 +315,22 @@ impl Adjustment {
         i: usize,
         candidate: &CandidateMotion,
         place: [f64; 2],
+        turn: &Turn,
     ) -> Option<CloudMotion> {
         let equations = self.observed_by_clouds(i, candidate, self.prior.components.error_m);
         if equations.information.trace() <= 0.0 {
             return None;
         }
         let shift = self.prior.loose.move_m.max(self.params.max_sd_m).powi(-2);
-        let turn = OPEN[0].powi(-2);
-        let bend = OPEN[1].powi(-2);
-        let open = Vector9::from([shift, shift, shift, turn, turn, turn, bend, bend, bend]);
-        let inverse = (equations.information + Matrix9::from_diagonal(&open))
-            .cholesky()?
-            .inverse();
+        let (mut information, mut vector) = (equations.information, equations.vector);
+        (0..3).for_each(|k| information[(k, k)] += shift);
+        let mut rest = information.fixed_view_mut::<6, 6>(3, 3);
+        rest += turn.information;
+        let mut rest = vector.fixed_rows_mut::<6>(3);
+        rest += turn.vector;
+        let inverse = information.cholesky()?.inverse();
         let lever = StonePhotos::lever(place);
-        let mean: Vector3<f64> = lever * (inverse * equations.vector + self.prior.common_in(i).unknowns());
+        let mean: Vector3<f64> = lever * (inverse * vector + self.prior.common_in(i).unknowns());
         let covariance = lever * inverse * lever.transpose();
         Some(CloudMotion {
             mean,
@@ -320,5 +372,57 @@ impl Adjustment {
             c.covariance[(0, 0)].max(c.covariance[(1, 1)]).sqrt()
         });
         (params.search_m + SEARCH_SDS * sd).min(params.max_search_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{begun, wall};
+    use super::*;
+    use crate::registration::points::MemoryPairs;
+
+    #[test]
+    fn a_predicted_turn_weighs_in_a_displacement_as_in_the_posterior_of_the_whole_motion() {
+        let source = MemoryPairs::new(wall(5, [0.001; 2], |k| {
+            Vector3::new(0.0, 1e-4 * f64::from(k), 0.0)
+        }));
+        let (mut adjustment, points) = begun(&source);
+        adjustment.estimate_noise(&points.sample);
+        adjustment.evaluate(&points).unwrap();
+        let own = adjustment.prior.own_variances();
+        let shift_m = adjustment.prior.loose.move_m.max(adjustment.params.max_sd_m);
+        let rotation = Matrix3::new(4.0, 1.0, 0.5, 1.0, 3.0, -0.2, 0.5, -0.2, 2.0) * 1e-8;
+        let mut covariance = Matrix6::identity() * (shift_m * shift_m);
+        covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
+        let prediction = Prediction {
+            mean: Vector6::new(0.0, 0.0, 0.0, 2e-3, -1e-3, 3e-3),
+            covariance,
+        };
+
+        for i in [3, 20] {
+            let candidate = &adjustment.stones[i].with_field;
+            let equations = adjustment.observed_by_clouds(i, candidate, adjustment.prior.components.error_m);
+            let mut of_turn = own;
+            of_turn[..3].fill(0.0);
+            let whole = posterior(&equations, &prediction, &of_turn);
+            let expected = whole.mean.translation() + adjustment.prior.common_in(i).translation();
+            let spread = whole.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+
+            let about = |turn: &Turn| {
+                adjustment
+                    .cloud_motion_about(i, candidate, [0.0; 2], turn)
+                    .unwrap()
+            };
+            let found = about(&Turn::predicted(&prediction, &own).unwrap());
+            assert!(
+                (found.mean - expected).norm() < 1e-6 * spread.trace().sqrt(),
+                "{} {expected}",
+                found.mean
+            );
+            assert!((found.covariance - spread).norm() < 1e-5 * spread.norm());
+            // It is worth something.
+            let open = about(&Turn::open());
+            assert!(found.covariance.trace() < 0.8 * open.covariance.trace());
+        }
     }
 }

@@ -8,6 +8,7 @@ use crate::linalg::{BlockFactor, BlockPattern};
 use crate::registration::adjustment::JointMotions;
 use crate::registration::adjustment::joint_motions::JointStone;
 use crate::registration::observers::JointErrors;
+use crate::registration::octave_patches::octave_patches;
 use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -199,35 +200,21 @@ impl<'a> Body<'a> {
     }
 }
 
-/// Errors that points share over octaves of length, from twice the distance of neighbours up: patches of a
-/// checkerboard of each length err alike.
+/// Errors that points share over octaves of length, from twice the distance of neighbours up: see [`octave_patches`].
 fn add_octaves(shared: &mut SharedErrors, motions: &JointMotions, stones: &[BodyStone]) {
     if stones.iter().all(|s| s.joint.octave.norm() == 0.0) {
         return;
     }
-    let mut rest = motions.octaves - 1.0;
-    let mut length_m = motions.step_m;
-    while rest > 0.0 {
-        length_m *= 2.0;
-        let share = rest.min(1.0).sqrt();
-        rest -= 1.0;
-        let mut numbers = BTreeMap::new();
-        let cells: Vec<usize> = stones
-            .iter()
-            .map(|s| {
-                let next = numbers.len();
-                let cell = s.joint.place.coords.map(|x| (x / length_m).floor() as i64);
-                *numbers.entry([cell.x, cell.y, cell.z]).or_insert(next)
-            })
-            .collect();
-        let row = |(stone, cell): (&BodyStone, &usize)| {
-            let cell = *cell;
-            let columns = stone.joint.octave * share;
+    let places = stones.iter().map(|s| s.joint.place);
+    for octave in octave_patches(places, motions.step_m, motions.octaves) {
+        let row = |(stone, patch): (&BodyStone, &usize)| {
+            let patch = *patch;
+            let columns = stone.joint.octave * octave.share.sqrt();
             (0..3)
-                .map(|c| (3 * cell + c, columns.column(c).into_owned()))
+                .map(|c| (3 * patch + c, columns.column(c).into_owned()))
                 .collect()
         };
-        shared.add_units(3 * numbers.len(), stones.iter().zip(&cells).map(row));
+        shared.add_units(3 * octave.count, stones.iter().zip(&octave.of_stones).map(row));
     }
 }
 

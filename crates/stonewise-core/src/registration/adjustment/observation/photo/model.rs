@@ -6,10 +6,12 @@ use super::poses::{CloudMotion, PoseProblem, PoseStone};
 use super::stone_photos::StonePhotos;
 use crate::geometry::Bounds;
 use crate::registration::adjustment::candidate::Moving;
+use crate::registration::octave_patches::octave_patches;
 use crate::registration::photos::{Photo, PhotoParams, PhotoStatus, Track};
 use crate::statistics::upper_median;
 use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
+use std::array::from_fn;
 
 /// Disagreements of two normalisations that stand for as many more before those of a stone count by
 /// themselves.
@@ -42,6 +44,9 @@ pub(crate) struct PhotoModel {
     rows_px: Vec<[f64; 2]>,
     /// Covariance of the poses' errors.
     of_poses: DMatrix<f64>,
+    /// Covariances of the right sides of the poses' equations by errors that points share over octaves of length, per
+    /// variance of one octave along, up and out of the faces.
+    pulled_by_octaves: [DMatrix<f64>; 3],
 }
 
 /// A stone as the model needs it.
@@ -113,6 +118,7 @@ impl PhotoModel {
             poses_px: vec![0.0; photos.len()],
             rows_px: Vec::new(),
             of_poses: DMatrix::zeros(0, 0),
+            pulled_by_octaves: from_fn(|_| DMatrix::zeros(0, 0)),
         }
     }
 
@@ -127,13 +133,15 @@ impl PhotoModel {
 
     /// Adjusts the poses to where the clouds put the stones, and takes from the photos what they say with
     /// these poses.
-    pub fn update(&mut self, stones: &[StoneInPhotos], bias_m: f64) {
+    pub fn update(&mut self, stones: &[StoneInPhotos], bias_m: f64, (step_m, octaves): (f64, f64)) {
         let factors = self.bias_factors();
         let used: Vec<usize> = (0..stones.len())
             .filter(|&i| self.tracks[i].status == PhotoStatus::Tracked && stones[i].clouds.is_some())
             .collect();
         let places = used.iter().map(|&i| stones[i].centroid);
-        let Some(bounds) = Bounds::of(places) else { return };
+        let Some(bounds) = Bounds::of(places.clone()) else {
+            return;
+        };
         let problem = PoseProblem {
             centres: &self.centres,
             epochs: &self.epochs,
@@ -181,6 +189,8 @@ impl PhotoModel {
                 .unwrap_or_default();
         }
 
+        let octaves = octave_patches(places, step_m, octaves);
+        self.pulled_by_octaves = problem.pulled_by(&octaves, &poses, bias_m, &of_used);
         let photos = 0..self.centres.len();
         self.poses_px = photos.clone().map(|i| problem.pose_px(i, &poses)).collect();
         self.rows_px = photos
@@ -208,15 +218,12 @@ impl PhotoModel {
         }
     }
 
-    /// Covariance of the errors of all poses.
-    pub fn of_poses(&self) -> &DMatrix<f64> {
-        &self.of_poses
-    }
-
-    /// Covariance between two stones' displacements by their photos that errors of the poses cause, each
-    /// stone in its own frame.
-    pub fn pose_covariance(&self, first: &StonePhotos, second: &StonePhotos) -> Matrix3<f64> {
-        first.by_poses.covariance_with(&second.by_poses, &self.of_poses)
+    /// Covariance of the errors of all poses. The poses are adjusted to the clouds and follow the errors of their
+    /// points: `octave_m2`, variances of what points share over one octave of length, along, up and out of the faces.
+    pub fn of_poses(&self, octave_m2: &Vector3<f64>) -> DMatrix<f64> {
+        let [along, up, out] = &self.pulled_by_octaves;
+        let pulled = along * octave_m2.x + up * octave_m2.y + out * octave_m2.z;
+        &self.of_poses + &self.of_poses * pulled * &self.of_poses
     }
 
     /// Place on a stone's face whose displacement its photos show.
@@ -384,6 +391,7 @@ mod tests {
             poses_px: vec![0.0; 2],
             rows_px: Vec::new(),
             of_poses: DMatrix::zeros(0, 0),
+            pulled_by_octaves: from_fn(|_| DMatrix::zeros(0, 0)),
         }
     }
 

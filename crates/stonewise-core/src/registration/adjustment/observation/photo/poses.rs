@@ -15,9 +15,11 @@
 //! motions relative to each other.
 
 use super::evidence::{FaceShift, PhotoShift};
+use crate::registration::octave_patches::OctavePatches;
 use crate::registration::photos::{Sight, Track};
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3xX, Point3, SMatrix, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3xX, MatrixXx3, Point3, SMatrix, Vector2, Vector3};
 use std::array::from_fn;
+use std::collections::BTreeMap;
 
 /// Unknowns of a photo: position and attitude; with a rolling shutter also its own part of the shift of the
 /// last row relative to the first.
@@ -108,6 +110,8 @@ pub(super) struct Poses {
     pub scatter: Scatter,
     /// Weight of each sight, in the order of stones and sights.
     pub weights: Vec<Vec<f64>>,
+    /// Weight of what the clouds show of each stone.
+    pub trust: Vec<f64>,
 }
 
 type StoneMatrix = SMatrix<f64, STONE, STONE>;
@@ -122,12 +126,20 @@ pub(super) struct StoneSystem {
     columns: Vec<usize>,
 }
 
+/// How the poses' equations follow the displacement of a stone by the clouds, in its frame.
+struct Pull {
+    /// Indices of the unknowns of the poses.
+    columns: Vec<usize>,
+    /// One row each.
+    by_clouds: MatrixXx3<f64>,
+}
+
 /// How errors of the poses change a stone's displacement by its photos, in the stone's frame.
 #[derive(Clone, Debug)]
 pub(crate) struct PoseInfluence {
     /// Indices of the unknowns of the poses.
     columns: Vec<usize>,
-    /// Derivative of the displacement with respect to these unknowns, three rows.
+    /// Derivative of the displacement with respect to these unknowns, with the opposite sign, three rows.
     matrix: Matrix3xX<f64>,
 }
 
@@ -352,6 +364,7 @@ impl PoseProblem<'_> {
                 covariance,
                 scatter,
                 weights: weights.clone(),
+                trust: trust.clone(),
             });
             scatter.rows_px = rows_px;
         }
@@ -418,6 +431,57 @@ impl PoseProblem<'_> {
         }
         let cholesky = normal.cholesky()?;
         Some((cholesky.solve(&right), cholesky.inverse()))
+    }
+
+    /// Covariances of the right sides of the poses' equations that errors of the clouds over octaves of length cause,
+    /// per variance of one octave along, up and out of the faces. `octaves`: the patches of these stones.
+    pub fn pulled_by(
+        &self,
+        octaves: &[OctavePatches],
+        poses: &Poses,
+        bias_m: f64,
+        factors: &[f64],
+    ) -> [DMatrix<f64>; 3] {
+        let pulls: Vec<Option<Pull>> = (0..self.stones.len())
+            .map(|k| self.pull(k, poses, bias_m, factors[k]))
+            .collect();
+        let count = self.unknowns();
+        let mut sums = from_fn(|_| DMatrix::zeros(count, count));
+        for octave in octaves {
+            // By row: few photos show the stones of a small patch.
+            let mut patches = vec![BTreeMap::<usize, Vector3<f64>>::new(); octave.count];
+            for (pull, patch) in pulls.iter().zip(&octave.of_stones) {
+                for (column, by) in pull
+                    .iter()
+                    .flat_map(|p| p.columns.iter().zip(p.by_clouds.row_iter()))
+                {
+                    *patches[*patch].entry(*column).or_default() += by.transpose();
+                }
+            }
+            for pulled in patches {
+                for (row, of_row) in &pulled {
+                    for (column, of_column) in &pulled {
+                        for (axis, sum) in sums.iter_mut().enumerate() {
+                            sum[(*row, *column)] += octave.share * of_row[axis] * of_column[axis];
+                        }
+                    }
+                }
+            }
+        }
+        sums
+    }
+
+    /// How the poses' equations follow what the clouds show of a stone.
+    fn pull(&self, k: usize, poses: &Poses, bias_m: f64, factor: f64) -> Option<Pull> {
+        let stone = &self.stones[k];
+        let mut system = self.system(stone, &poses.weights[k], &poses.scatter);
+        let prior = self.prior(stone, poses.trust[k], bias_m, factor);
+        system.add_prior(&prior, &stone.clouds.mean);
+        let by_displacement = system.own.cholesky()?.inverse().fixed_columns::<3>(3) * prior;
+        Some(Pull {
+            by_clouds: -(system.cross.transpose() * by_displacement),
+            columns: system.columns,
+        })
     }
 
     /// A stone's own unknowns, given the poses.

@@ -205,6 +205,7 @@ mod tests {
                 rows_px: [1.0; 2],
             },
             weights: vec![vec![1.0; 4]],
+            trust: vec![1.0],
         }
     }
 

@@ -133,6 +133,7 @@ fn poses_and_displacements_are_those_of_dense_least_squares() {
         covariance,
         scatter,
         weights: weights.clone(),
+        trust: vec![1.0; 9],
     };
     let system = problem.system(&problem.stones[4], &weights[4], &scatter);
     let (information, vector, by_poses) = system.displacement(&poses).unwrap();
@@ -246,5 +247,87 @@ fn shifted_rows_do_not_move_stones() {
     for shifts_px in [each, alike] {
         let [known, unknown] = [1.0, 0.0].map(|known| worst_m(&shifts_px, known));
         assert!(known < 2e-4 && unknown > 5e-4, "{known} {unknown}");
+    }
+}
+
+#[test]
+fn errors_of_the_clouds_move_the_poses_as_solving_with_them_does() {
+    let turn = FaceFrame::from_normal(&Vector3::new(0.9, 0.1, 0.3)).face_from_world();
+    let centres: Vec<Point3<f64>> = (0..5)
+        .map(|i| Point3::new(6.0, f64::from(i) - 2.0, 0.5 * f64::from(i % 3)))
+        .collect();
+    let places: Vec<Point3<f64>> = (0..9)
+        .map(|i| Point3::new(0.0, f64::from(i % 3) - 1.0, f64::from(i / 3)))
+        .collect();
+    let tracks = tracks(&centres, &places, &turn);
+    let clouds = CloudMotion {
+        mean: Vector3::new(1e-3, 2e-3, -1e-3),
+        covariance: Matrix3::new(9e-6, 1e-6, 0.0, 1e-6, 4e-6, 0.0, 0.0, 0.0, 1e-6),
+    };
+    let octaves = || {
+        let octave = |share: f64, of_stones: [usize; 9]| OctavePatches {
+            share,
+            of_stones: of_stones.to_vec(),
+            count: of_stones.iter().max().unwrap() + 1,
+        };
+        vec![
+            octave(1.0, [0, 0, 1, 0, 0, 1, 2, 2, 2]),
+            octave(0.3, [0, 0, 0, 0, 0, 1, 1, 1, 1]),
+        ]
+    };
+    let (bias_m, factors, trust) = (5e-4, [1.5; 9], [1.0, 0.7, 1.0, 0.4, 1.0, 1.0, 0.9, 1.0, 1.0]);
+    let weights: Vec<Vec<f64>> = vec![vec![1.0, 0.5, 1.0, 0.8, 1.0]; 9];
+    let scatter = Scatter {
+        factor: 3.0,
+        rows_px: [0.7, 0.4],
+    };
+    let problem = |error: &dyn Fn(usize) -> Vector3<f64>| {
+        let mut stones = pose_stones(&tracks, &places, &turn, clouds);
+        for (k, stone) in stones.iter_mut().enumerate() {
+            stone.clouds.mean += error(k);
+        }
+        PoseProblem {
+            centres: &centres,
+            epochs: &[0, 1, 0, 1, 1],
+            scales: &[[0.003, 6.0]; 5],
+            pose_error_px: 0.5,
+            rolling_shutter: true,
+            stones,
+            middle: Point3::new(0.0, 0.0, 1.0),
+            extent_m: 2.0,
+        }
+    };
+    let solve = |error: &dyn Fn(usize) -> Vector3<f64>| {
+        let problem = problem(error);
+        problem
+            .solve_weighted(&weights, &trust, &scatter, bias_m, &factors)
+            .unwrap()
+    };
+
+    let (corrections, covariance) = solve(&|_| Vector3::zeros());
+    let poses = Poses {
+        corrections: corrections.clone(),
+        covariance,
+        scatter,
+        weights: weights.clone(),
+        trust: trust.to_vec(),
+    };
+    let pulled = problem(&|_| Vector3::zeros()).pulled_by(&octaves(), &poses, bias_m, &factors);
+    for (axis, pulled) in pulled.iter().enumerate() {
+        let found = &poses.covariance * pulled * &poses.covariance;
+        let mut expected = DMatrix::zeros(corrections.len(), corrections.len());
+        for octave in octaves() {
+            for patch in 0..octave.count {
+                let error = |k: usize| Vector3::ith(axis, f64::from(u8::from(octave.of_stones[k] == patch)));
+                let moved = solve(&error).0 - &corrections;
+                expected += &moved * moved.transpose() * octave.share;
+            }
+        }
+        assert!(
+            (&found - &expected).norm() < 1e-6 * expected.norm(),
+            "{axis}: {} {}",
+            found.norm(),
+            expected.norm()
+        );
     }
 }
