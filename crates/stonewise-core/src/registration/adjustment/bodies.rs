@@ -12,8 +12,9 @@ use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Probability that a body which moves with the wall departs from it as far by chance, below which it
-/// disagrees: one in a million, for many bodies of many walls are tested.
-const DISAGREES: f64 = 1e-6;
+/// disagrees. A motion that nothing confirms must not be called significant; at one in a thousand, that would need a
+/// wall of fewer than 50 stones.
+const DISAGREES: f64 = 1e-3;
 /// Share of the stones of a body that photos must find for its motion to be confirmed, relative to the share
 /// that they find of all.
 const CONFIRMED: f64 = 0.5;

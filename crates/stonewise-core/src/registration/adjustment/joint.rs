@@ -10,7 +10,7 @@ use super::state::{Adjustment, Evidence};
 use super::stone_vector::Vector9;
 use crate::linalg::without_negative;
 use crate::stone::{MotionFailure, PairResult};
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::Matrix3;
 use rayon::prelude::*;
 
 /// The joint distribution as the last solution has it.
@@ -19,7 +19,7 @@ pub(super) fn joint_motions(
     solution: &Solution,
     results: &[PairResult],
     estimates: &[Result<Estimate, MotionFailure>],
-    (octaves, poses): (&Octaves, DMatrix<f64>),
+    octaves: &Octaves,
 ) -> JointMotions {
     let one = octaves.one();
     let stone = |i: usize| {
@@ -98,7 +98,7 @@ pub(super) fn joint_motions(
         stones,
         edges: graph.edges.iter().map(|e| (e.low, e.high)).collect(),
         information,
-        poses,
+        poses: octaves.of_poses(adjustment),
         octaves: adjustment.octaves(),
         step_m: adjustment.step_m().unwrap_or(f64::INFINITY),
     }

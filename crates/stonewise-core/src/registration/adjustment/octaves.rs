@@ -5,7 +5,7 @@ use super::state::Adjustment;
 use super::tracking::PhotoPart;
 use crate::geometry::SmallMotion;
 use crate::statistics::{UPPER_95, component_median, quantile};
-use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
+use nalgebra::{DMatrix, Matrix3, MatrixXx3, Point3, Vector3};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Share of the stones by which the scatter of their motions is measured.
@@ -30,6 +30,8 @@ pub(super) struct Octaves {
     of_stone_m2: f64,
     /// Factor on the variance along, up and out that the motions show, at most one.
     shown: Vector3<f64>,
+    /// The same, if the errors of the poses that follow errors of the points explain nothing of the motions.
+    shown_at_most: Vector3<f64>,
 }
 
 /// A motion by which the errors are measured.
@@ -52,6 +54,7 @@ impl Octaves {
             count: adjustment.octaves(),
             of_stone_m2: one[2] - one[0],
             shown: Vector3::repeat(1.0),
+            shown_at_most: Vector3::repeat(1.0),
         }
     }
 
@@ -65,20 +68,40 @@ impl Octaves {
             count: (expected.count - absorbed).max(1.0),
             ..expected
         };
-        let motion = |i: usize| {
-            let node = &adjustment.prior.graph.nodes[i];
-            let face_from_world = node.face_from_world;
-            Some(Shown {
-                place: node.centroid,
-                displacement: face_from_world.transpose() * displacement(i)?,
-                face_from_world,
-                expected_m2: scattered.over_all(adjustment.photo_part(i).as_ref()).diagonal(),
-            })
+        let of_motions = |by_poses: Option<&ByPoses>| {
+            let motion = |i: usize| {
+                let node = &adjustment.prior.graph.nodes[i];
+                let face_from_world = node.face_from_world;
+                let part = adjustment.photo_part(i);
+                let of_points = scattered.over_all(part.as_ref()).diagonal();
+                let by_poses = part.zip(by_poses);
+                Some(Shown {
+                    place: node.centroid,
+                    displacement: face_from_world.transpose() * displacement(i)?,
+                    face_from_world,
+                    expected_m2: by_poses.map_or(of_points, |(part, by_poses)| {
+                        of_points + by_poses.about_mean(&part, &face_from_world)
+                    }),
+                })
+            };
+            let motions: Vec<Shown> = (0..adjustment.stones.len()).filter_map(motion).collect();
+            shown(&motions, &common(&motions, free_rotation))
         };
-        let motions: Vec<Shown> = (0..adjustment.stones.len()).filter_map(motion).collect();
+        let shown_at_most = of_motions(None);
+        let by_poses = ByPoses::of(adjustment, &expected.one().diagonal());
         Self {
-            shown: shown(&motions, &common(&motions, free_rotation)),
+            shown: by_poses.map_or(shown_at_most, |by| of_motions(Some(&by))),
+            shown_at_most,
             ..expected
+        }
+    }
+
+    /// The octaves at most as large. How many patches of a wall err independently is not known, so that a test of its
+    /// shape takes these.
+    pub fn at_most(&self) -> Self {
+        Self {
+            shown: self.shown_at_most,
+            ..*self
         }
     }
 
@@ -118,6 +141,52 @@ impl Octaves {
     pub fn shown(&self, expected: &Matrix3<f64>) -> Matrix3<f64> {
         let root = Matrix3::from_diagonal(&self.shown.map(f64::sqrt));
         root * expected * root
+    }
+}
+
+/// Errors of the poses that follow errors of the points: in the stones' displacements and in the mean of these.
+struct ByPoses {
+    /// Covariance of the poses' errors.
+    poses: DMatrix<f64>,
+    /// Covariance of these errors with the mean displacement, world.
+    with_mean: MatrixXx3<f64>,
+    /// Covariance of the mean displacement, world.
+    of_mean: Matrix3<f64>,
+}
+
+impl ByPoses {
+    /// `None` where photos take no part. `octave_m2`: variances of one octave along, up and out.
+    fn of(adjustment: &Adjustment, octave_m2: &Vector3<f64>) -> Option<Self> {
+        let poses = adjustment.photos.as_ref()?.by_octaves(octave_m2);
+        let mut mean = MatrixXx3::zeros(poses.nrows());
+        let mut count: f64 = 0.0;
+        for (i, node) in adjustment.prior.graph.nodes.iter().enumerate() {
+            let Some(part) = adjustment.photo_part(i) else {
+                continue;
+            };
+            count += 1.0;
+            for (unknown, by) in part.by_poses() {
+                let mut row = mean.row_mut(unknown);
+                row += (node.face_from_world.transpose() * by).transpose();
+            }
+        }
+        mean /= count.max(1.0);
+        let with_mean = &poses * &mean;
+        Some(Self {
+            of_mean: mean.transpose() * &with_mean,
+            poses,
+            with_mean,
+        })
+    }
+
+    /// Variances of a stone's displacement about the mean, in its frame.
+    fn about_mean(&self, part: &PhotoPart, face_from_world: &Matrix3<f64>) -> Vector3<f64> {
+        let with_mean = part
+            .by_poses()
+            .map(|(unknown, by)| by * self.with_mean.row(unknown));
+        let with_mean = with_mean.sum::<Matrix3<f64>>() * face_from_world.transpose();
+        let of_mean = face_from_world * self.of_mean * face_from_world.transpose();
+        (part.pose_covariance(part, &self.poses) - with_mean - with_mean.transpose() + of_mean).diagonal()
     }
 }
 

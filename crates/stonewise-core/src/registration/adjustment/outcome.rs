@@ -101,7 +101,7 @@ impl Found {
                 solution,
                 &results,
                 &estimates,
-                (&octaves, poses),
+                &octaves.at_most(),
             )),
             results,
         }

@@ -221,9 +221,14 @@ impl PhotoModel {
     /// Covariance of the errors of all poses. The poses are adjusted to the clouds and follow the errors of their
     /// points: `octave_m2`, variances of what points share over one octave of length, along, up and out of the faces.
     pub fn of_poses(&self, octave_m2: &Vector3<f64>) -> DMatrix<f64> {
+        &self.of_poses + self.by_octaves(octave_m2)
+    }
+
+    /// The part of this covariance that errors of the points cause.
+    pub fn by_octaves(&self, octave_m2: &Vector3<f64>) -> DMatrix<f64> {
         let [along, up, out] = &self.pulled_by_octaves;
         let pulled = along * octave_m2.x + up * octave_m2.y + out * octave_m2.z;
-        &self.of_poses + &self.of_poses * pulled * &self.of_poses
+        &self.of_poses * pulled * &self.of_poses
     }
 
     /// Place on a stone's face whose displacement its photos show.
