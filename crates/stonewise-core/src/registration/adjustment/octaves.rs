@@ -96,8 +96,8 @@ impl Octaves {
         }
     }
 
-    /// The octaves at most as large. How many patches of a wall err independently is not known, so that a test of its
-    /// shape takes these.
+    /// Upper bound of the octaves: as large as the motions allow without the errors of the poses. The number of patches
+    /// of a wall with independent errors is not known, so the test of its shape uses this bound.
     pub fn at_most(&self) -> Self {
         Self {
             shown: self.shown_at_most,
@@ -117,8 +117,8 @@ impl Octaves {
 
     /// Covariance over all octaves, against the other epoch; `photos`: their part in the motion.
     ///
-    /// Photos share the errors of the points only through the poses, and over one octave: what is wrong over the
-    /// length of a stone, a mask or a stain, they see like the points. Light shifts neighbours alike, so that the
+    /// Photos share the errors of the points only through the poses, and over one octave: an error over the length of
+    /// a stone (of a mask, or from a stain) affects photos and points alike. Light shifts neighbours alike, so that the
     /// least bias of appearance is shared over all octaves, too.
     pub fn over_all(&self, photos: Option<&PhotoPart>) -> Matrix3<f64> {
         let octaves = |count: f64| Matrix3::identity() * (count * self.expected_m2);
@@ -130,8 +130,8 @@ impl Octaves {
         })
     }
 
-    /// Covariance of the errors of the photos' poses, with what follows the errors of the points; of no unknowns where
-    /// photos take no part.
+    /// Covariance of the errors of the photos' poses, including those caused by errors of the points; an empty matrix
+    /// where no photos are used.
     pub fn of_poses(&self, adjustment: &Adjustment) -> DMatrix<f64> {
         let photos = adjustment.photos.as_ref();
         photos.map_or_else(|| DMatrix::zeros(0, 0), |p| p.of_poses(&self.one().diagonal()))

@@ -420,7 +420,7 @@ mod tests {
                 found.mean
             );
             assert!((found.covariance - spread).norm() < 1e-5 * spread.norm());
-            // It is worth something.
+            // The prediction reduces the variance noticeably.
             let open = about(&Turn::open());
             assert!(found.covariance.trace() < 0.8 * open.covariance.trace());
         }
