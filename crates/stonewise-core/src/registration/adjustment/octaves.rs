@@ -68,19 +68,22 @@ impl Octaves {
             count: (expected.count - absorbed).max(1.0),
             ..expected
         };
+        let parts: Vec<Option<PhotoPart>> = (0..adjustment.stones.len())
+            .map(|i| adjustment.photo_part(i))
+            .collect();
         let of_motions = |by_poses: Option<&ByPoses>| {
             let motion = |i: usize| {
                 let node = &adjustment.prior.graph.nodes[i];
                 let face_from_world = node.face_from_world;
-                let part = adjustment.photo_part(i);
-                let of_points = scattered.over_all(part.as_ref()).diagonal();
+                let part = parts[i].as_ref();
+                let of_points = scattered.over_all(part).diagonal();
                 let by_poses = part.zip(by_poses);
                 Some(Shown {
                     place: node.centroid,
                     displacement: face_from_world.transpose() * displacement(i)?,
                     face_from_world,
                     expected_m2: by_poses.map_or(of_points, |(part, by_poses)| {
-                        of_points + by_poses.about_mean(&part, &face_from_world)
+                        of_points + by_poses.about_mean(part, &face_from_world)
                     }),
                 })
             };
@@ -88,7 +91,7 @@ impl Octaves {
             shown(&motions, &common(&motions, free_rotation))
         };
         let shown_at_most = of_motions(None);
-        let by_poses = ByPoses::of(adjustment, &expected.one().diagonal());
+        let by_poses = ByPoses::of(adjustment, &parts, &expected.one().diagonal());
         Self {
             shown: by_poses.map_or(shown_at_most, |by| of_motions(Some(&by))),
             shown_at_most,
@@ -155,13 +158,13 @@ struct ByPoses {
 }
 
 impl ByPoses {
-    /// `None` where photos take no part. `octave_m2`: variances of one octave along, up and out.
-    fn of(adjustment: &Adjustment, octave_m2: &Vector3<f64>) -> Option<Self> {
+    /// `None` where photos take no part. `parts`: of the stones; `octave_m2`: variances of one octave along, up, out.
+    fn of(adjustment: &Adjustment, parts: &[Option<PhotoPart>], octave_m2: &Vector3<f64>) -> Option<Self> {
         let poses = adjustment.photos.as_ref()?.by_octaves(octave_m2);
         let mut mean = MatrixXx3::zeros(poses.nrows());
         let mut count: f64 = 0.0;
-        for (i, node) in adjustment.prior.graph.nodes.iter().enumerate() {
-            let Some(part) = adjustment.photo_part(i) else {
+        for (node, part) in adjustment.prior.graph.nodes.iter().zip(parts) {
+            let Some(part) = part else {
                 continue;
             };
             count += 1.0;

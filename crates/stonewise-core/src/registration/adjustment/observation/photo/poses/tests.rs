@@ -58,15 +58,21 @@ fn pose_stones<'a>(
     tracks.iter().zip(places).map(of_place).collect()
 }
 
+/// The centres of five photos before nine stones, and the places of these.
+fn scene() -> (Vec<Point3<f64>>, Vec<Point3<f64>>) {
+    let centres = (0..5)
+        .map(|i| Point3::new(6.0, f64::from(i) - 2.0, 0.5 * f64::from(i % 3)))
+        .collect();
+    let places = (0..9)
+        .map(|i| Point3::new(0.0, f64::from(i % 3) - 1.0, f64::from(i / 3)))
+        .collect();
+    (centres, places)
+}
+
 #[test]
 fn poses_and_displacements_are_those_of_dense_least_squares() {
     let turn = FaceFrame::from_normal(&Vector3::x()).face_from_world();
-    let centres: Vec<Point3<f64>> = (0..5)
-        .map(|i| Point3::new(6.0, f64::from(i) - 2.0, 0.5 * f64::from(i % 3)))
-        .collect();
-    let places: Vec<Point3<f64>> = (0..9)
-        .map(|i| Point3::new(0.0, f64::from(i % 3) - 1.0, f64::from(i / 3)))
-        .collect();
+    let (centres, places) = scene();
     let tracks = tracks(&centres, &places, &turn);
     let clouds = CloudMotion {
         mean: Vector3::new(1e-3, 2e-3, -1e-3),
@@ -253,12 +259,7 @@ fn shifted_rows_do_not_move_stones() {
 #[test]
 fn errors_of_the_clouds_move_the_poses_as_solving_with_them_does() {
     let turn = FaceFrame::from_normal(&Vector3::new(0.9, 0.1, 0.3)).face_from_world();
-    let centres: Vec<Point3<f64>> = (0..5)
-        .map(|i| Point3::new(6.0, f64::from(i) - 2.0, 0.5 * f64::from(i % 3)))
-        .collect();
-    let places: Vec<Point3<f64>> = (0..9)
-        .map(|i| Point3::new(0.0, f64::from(i % 3) - 1.0, f64::from(i / 3)))
-        .collect();
+    let (centres, places) = scene();
     let tracks = tracks(&centres, &places, &turn);
     let clouds = CloudMotion {
         mean: Vector3::new(1e-3, 2e-3, -1e-3),
