@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise_core::raster::{LabelImage, Raster};
-use stonewise_io::cloud::{CloudError, read_cloud, write_coloured_laz, write_points_laz};
+use stonewise_io::cloud::{CloudError, read_cloud, write_points_laz};
 use stonewise_io::image_io::{read_rgb, write_jpeg};
 use stonewise_io::masks::write_label_png;
 
@@ -58,16 +58,11 @@ fn replace(cloud: &Path, crs: Option<&str>, points: &[Point3<f64>]) {
 /// Writes a cloud again with a coordinate system in its header.
 fn name_system(cloud: &Path, epsg: u32) {
     let points = points(cloud);
-    let bounds = stonewise_core::geometry::Bounds::of(points.iter().copied()).unwrap();
     let wkt = format!(
         "PROJCS[\"system {epsg}\",GEOGCS[\"ETRS89\",DATUM[\"x\",SPHEROID[\"GRS 1980\",6378137,298.257222101]],PRIMEM[\"Greenwich\",0],\
          UNIT[\"degree\",0.0174532925199433]],PROJECTION[\"Transverse_Mercator\"],UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"{epsg}\"]]"
     );
-    fs::remove_file(cloud).unwrap();
-    write_coloured_laz::<CloudError>(cloud, &bounds, &[], Some(&wkt), |out| {
-        points.iter().try_for_each(|p| out.push(*p, [128; 3], &[]))
-    })
-    .unwrap();
+    replace(cloud, Some(&wkt), &points);
 }
 
 /// Photos of the second epoch.

@@ -8,27 +8,24 @@ use stonewise_core::geometry::Bounds;
 
 use super::CloudError;
 use super::extra_bytes::{Dimension, ExtraType, describe_all};
-use super::las::{Export, LazWriter, crs_record, export_header, transforms_for};
+use super::las::{CopcWriter, Export, crs_record, export_header, transforms_for};
 use super::whole::write_whole;
 
 /// Finest step of coordinates, metres.
 const FINEST_M: f64 = 1e-4;
-const CHUNK_POINTS: usize = 400_000;
 
-/// Takes the points of a LAZ file one by one; memory holds a chunk of them.
+/// Takes the points of a COPC file one by one.
 pub struct ColouredPoints {
-    writer: LazWriter,
+    writer: CopcWriter,
     transforms: Vector<Transform>,
     numbers: usize,
-    records: Vec<u8>,
-    waiting: usize,
 }
 
 impl ColouredPoints {
-    /// Adds a point inside the file's box, with its sRGB colour and one number for each dimension.
+    /// Adds a point inside the current part, with its sRGB colour and one number for each dimension.
     ///
     /// # Errors
-    /// The number of numbers is wrong, or the file cannot be written.
+    /// The number of numbers is wrong.
     pub fn push(
         &mut self,
         position: Point3<f64>,
@@ -46,54 +43,51 @@ impl ColouredPoints {
             source: 0,
             gps_time: 0.0,
         };
-        record.append(&self.transforms, &mut self.records);
-        self.records.extend(numbers.iter().flat_map(|v| v.to_le_bytes()));
-        self.waiting += 1;
-        if self.waiting == CHUNK_POINTS {
-            self.flush()
-        } else {
-            Ok(())
-        }
-    }
-
-    fn flush(&mut self) -> Result<(), CloudError> {
-        self.waiting = 0;
-        self.writer.write(std::mem::take(&mut self.records))
+        let records = self.writer.records(record.rounded(&self.transforms));
+        record.append(&self.transforms, records);
+        records.extend(numbers.iter().flat_map(|v| v.to_le_bytes()));
+        Ok(())
     }
 }
 
-/// Writes a LAZ file (LAS 1.4, point format 7) of coloured points with single-precision extra dimensions.
+/// Writes a cloud-optimised point cloud (COPC 1.0: LAS 1.4, point format 7) of coloured points with single-precision
+/// extra dimensions. Programs show it at once, as coarsely as the screen needs; to all others it is a LAZ file.
 ///
-/// `bounds`: a box around all points. `dimensions`: one for each number of a point. `crs`: the coordinate
-/// system, where it is known: WKT, or `EPSG:` and a code. `fill` hands over the points.
+/// `parts`: boxes around the points of each part, in order; memory holds the nodes of the octree that parts to come reach
+/// into. `points`: about how many points there are. `dimensions`: one for each number of a point. `crs`: the coordinate
+/// system, where it is known: WKT, or `EPSG:` and a code. `fill` hands over the points of a part, by its number.
 ///
 /// # Errors
-/// A name or a description does not fit, the box is too large, `fill` fails, or the file cannot be written;
-/// an earlier file is kept then.
-pub fn write_coloured_laz<E: From<CloudError>>(
+/// A name or a description does not fit, there is no part, the boxes are too large, `fill` fails, or the file cannot be
+/// written; an earlier file is kept then.
+pub fn write_coloured_copc<E: From<CloudError>>(
     path: &Path,
-    bounds: &Bounds,
+    parts: Vec<Bounds>,
+    points: u64,
     dimensions: &[Dimension<'_>],
     crs: Option<&str>,
-    fill: impl FnOnce(&mut ColouredPoints) -> Result<(), E>,
+    mut fill: impl FnMut(usize, &mut ColouredPoints) -> Result<(), E>,
 ) -> Result<(), E> {
     let descriptors = describe_all(path, dimensions.iter().map(|d| (*d, ExtraType::F32)))?;
-    let transforms = transforms_for(bounds, FINEST_M)
+    let bounds = parts.iter().copied().reduce(|a, b| a.union(&b));
+    let bounds = bounds.ok_or_else(|| CloudError::unwritable(path, "a cloud without parts"))?;
+    let transforms = transforms_for(&bounds, FINEST_M)
         .ok_or_else(|| CloudError::unwritable(path, format!("too large for LAS: {bounds:?}")))?;
     write_whole(path, |partial| {
         let extra_bytes = dimensions.len() as u16 * ExtraType::F32.size();
         let mut header = export_header(true, transforms, extra_bytes, descriptors);
         header.vlrs.extend(crs.and_then(crs_record));
-        let mut points = ColouredPoints {
-            writer: LazWriter::create(partial, path, header)?,
+        let count = parts.len();
+        let mut out = ColouredPoints {
+            writer: CopcWriter::create(partial, path, header, &bounds, parts, points)?,
             transforms,
             numbers: dimensions.len(),
-            records: Vec::new(),
-            waiting: 0,
         };
-        fill(&mut points)?;
-        points.flush()?;
-        Ok(points.writer.finish()?)
+        for part in 0..count {
+            fill(part, &mut out)?;
+            out.writer.end_part()?;
+        }
+        Ok(out.writer.finish(partial)?)
     })
 }
 
@@ -101,43 +95,143 @@ pub fn write_coloured_laz<E: From<CloudError>>(
 mod tests {
     use super::*;
     use crate::cloud::{cloud_info, read_cloud};
+    use las::copc::VoxelKey;
+    use las::{BoundsSelection, CopcReader, LodSelection};
+    use std::collections::BTreeSet;
+
+    const WKT: &str = "PROJCS[\"x\",AUTHORITY[\"EPSG\",\"25832\"]]";
+    const SIDE: u32 = 600;
+
+    /// A wall of 6 x 6 m, in parts of 1 m along it.
+    fn at(i: u32, j: u32) -> Point3<f64> {
+        Point3::new(
+            451_000.0 + f64::from(i) * 0.01,
+            5_601_000.0 + f64::from(i) * 0.003,
+            310.25 + f64::from(j) * 0.01,
+        )
+    }
+
+    fn part(number: u32) -> impl Iterator<Item = (u32, u32)> {
+        (number * 100..(number + 1) * 100).flat_map(|i| (0..SIDE).map(move |j| (i, j)))
+    }
+
+    fn write(path: &Path) {
+        let bounds = |n| Bounds::of(part(n).map(|(i, j)| at(i, j))).unwrap();
+        let dimensions = [Dimension::new("place", "", "place of the point")];
+        let points = u64::from(SIDE * SIDE);
+        write_coloured_copc::<CloudError>(
+            path,
+            (0..6).map(bounds).collect(),
+            points,
+            &dimensions,
+            Some(WKT),
+            |n, out| {
+                part(n as u32).try_for_each(|(i, j)| {
+                    out.push(at(i, j), [(i % 256) as u8, 0, 255], &[(i * SIDE + j) as f32])
+                })
+            },
+        )
+        .unwrap();
+    }
+
+    /// The last number of each record.
+    fn places(points: &las::PointData) -> Vec<u32> {
+        let records = points.raw_bytes().chunks(points.record_len());
+        records
+            .map(|r| f32::from_le_bytes(r[r.len() - 4..].try_into().unwrap()) as u32)
+            .collect()
+    }
+
+    #[test]
+    fn another_reader_finds_every_point_in_the_node_of_its_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.copc.laz");
+        write(&path);
+        let mut reader = CopcReader::from_path(&path).unwrap();
+        let info = reader.header().copc_info_vlr().unwrap();
+        let entries: Vec<_> = reader.hierarchy_entries().collect();
+        let mut levels = [0; 3];
+        let mut seen = BTreeSet::new();
+        for entry in &entries {
+            assert!(entry.key.l == 0 || entries.iter().any(|e| e.key == entry.key.parent()));
+            let bounds = entry.key.bounds(&info);
+            let points = reader.read_entry(entry).unwrap();
+            levels[entry.key.l as usize] += points.len();
+            for place in places(&points) {
+                assert!(seen.insert(place));
+                let p = at(place / SIDE, place % SIDE);
+                let inside = |v: f64, min: f64, max: f64| v > min - 1e-4 && v < max + 1e-4;
+                assert!(inside(p.x, bounds.min.x, bounds.max.x));
+                assert!(inside(p.y, bounds.min.y, bounds.max.y));
+                assert!(inside(p.z, bounds.min.z, bounds.max.z));
+            }
+        }
+        assert_eq!(seen.len() as u32, SIDE * SIDE);
+        let share = |n: usize| n as f64 / f64::from(SIDE * SIDE) * 21.0;
+        assert!((share(levels[0]) - 1.0).abs() < 0.05 && (share(levels[1]) - 4.0).abs() < 0.1);
+        // A square of 6.3 m with this many points.
+        let spacing = (6.0 * 6.26 / levels[0] as f64).sqrt();
+        assert!(
+            (info.spacing / spacing - 1.0).abs() < 0.2,
+            "{} {spacing}",
+            info.spacing
+        );
+
+        let corner = BoundsSelection::Within(las::Bounds {
+            min: las::Vector {
+                x: 451_000.995,
+                y: 0.0,
+                z: 312.245,
+            },
+            max: las::Vector {
+                x: 451_002.005,
+                y: 1e7,
+                z: 313.255,
+            },
+        });
+        let found = reader.query(LodSelection::All, corner).unwrap();
+        assert_eq!(found.len(), 101 * 101);
+        assert!(reader.hierarchy_entry(&VoxelKey::ROOT).is_some());
+    }
 
     #[test]
     fn points_colours_and_the_coordinate_system_come_back() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.laz");
-        let at = |i: u32| Point3::new(451_000.0 + f64::from(i) * 0.01, 5_601_000.0, 310.25);
-        let bounds = Bounds::of((0..1000).map(at)).unwrap();
-        let wkt = "PROJCS[\"x\",AUTHORITY[\"EPSG\",\"25832\"]]";
-        let dimensions = [Dimension::new("d_out", "m", "displacement")];
-        write_coloured_laz::<CloudError>(&path, &bounds, &dimensions, Some(wkt), |points| {
-            (0..1000).try_for_each(|i| points.push(at(i), [i as u8, 0, 255], &[i as f32]))
-        })
-        .unwrap();
+        let path = folder.path().join("a.copc.laz");
+        write(&path);
         let info = cloud_info(&path).unwrap();
-        assert_eq!((info.records, info.crs.as_deref()), (1000, Some(wkt)));
-        read_cloud(&path, 2000, |chunk| {
-            for i in [0, 500, 999] {
-                assert!((chunk.positions[i] - at(i as u32)).norm() < 1e-4);
-                assert_eq!(
-                    chunk.colors.as_ref().unwrap()[i],
-                    [u16::from(i as u8) * 257, 0, 65_535]
-                );
+        assert_eq!(
+            (info.records, info.crs.as_deref()),
+            (u64::from(SIDE * SIDE), Some(WKT))
+        );
+        let places = places(&las::Reader::from_path(&path).unwrap().read_all().unwrap());
+        let mut read = 0;
+        read_cloud(&path, 20_000, |chunk| {
+            for (n, p) in chunk.positions.iter().enumerate() {
+                let place = places[chunk.indices[n] as usize];
+                assert!((p - at(place / SIDE, place % SIDE)).norm() < 1e-4);
+                let red = u16::from((place / SIDE % 256) as u8) * 257;
+                assert_eq!(chunk.colors.as_ref().unwrap()[n], [red, 0, 65_535]);
             }
+            read += chunk.positions.len();
             Ok::<(), CloudError>(())
         })
         .unwrap();
-        // The number of a point is single precision at the end of its record.
-        let records = las::Reader::from_path(&path).unwrap().read_all().unwrap();
-        for (i, record) in records.raw_bytes().chunks(records.record_len()).enumerate() {
-            assert_eq!(record[record.len() - 4..], (i as f32).to_le_bytes());
-        }
-        let wrong = write_coloured_laz::<CloudError>(&path, &bounds, &dimensions, None, |p| {
-            p.push(at(0), [0; 3], &[])
+        assert_eq!(read, places.len());
+    }
+
+    #[test]
+    fn an_earlier_file_is_kept_if_a_point_lacks_a_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.copc.laz");
+        write(&path);
+        let dimensions = [Dimension::new("place", "", "place of the point")];
+        let bounds = Bounds::of([at(0, 0), at(1, 1)]).unwrap();
+        let wrong = write_coloured_copc::<CloudError>(&path, vec![bounds], 1, &dimensions, None, |_, out| {
+            out.push(at(0, 0), [0; 3], &[])
         });
         let wrong = wrong.unwrap_err().to_string();
         assert!(wrong.contains("0 numbers for 1 dimensions"), "{wrong}");
-        // The file of before is kept.
-        assert_eq!(cloud_info(&path).unwrap().records, 1000);
+        assert_eq!(cloud_info(&path).unwrap().records, u64::from(SIDE * SIDE));
     }
 }

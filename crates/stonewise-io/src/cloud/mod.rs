@@ -27,7 +27,7 @@ mod text;
 mod whole;
 
 pub use chunk::{PointChunk, ReadSummary};
-pub use coloured::{ColouredPoints, write_coloured_laz};
+pub use coloured::{ColouredPoints, write_coloured_copc};
 pub use details::{CloudDetails, cloud_details};
 pub use error::CloudError;
 pub use extra_bytes::{Dimension, ExtraType};

@@ -13,8 +13,7 @@ use crate::results::names::FACE_CLOUD as FILE;
 use std::collections::BTreeMap;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::epoch::EpochId;
-use stonewise_core::geometry::Bounds;
-use stonewise_io::cloud::{Dimension, write_coloured_laz};
+use stonewise_io::cloud::{Dimension, write_coloured_copc};
 
 /// Writes the points of stones in the colours of the first later epoch.
 pub static FACE_CLOUD: Step = Step {
@@ -43,47 +42,44 @@ const DIMENSIONS: [Dimension; 6] = [
     Dimension::new("lod95_mm", "mm", "95 % detection limit"),
 ];
 
-/// Writes `stones.laz`: every point of a stone of the first epoch, coloured by its motion out of the wall on
+/// Writes `stones.copc.laz`: every point of a stone of the first epoch, coloured by its motion out of the wall on
 /// the scale of the report, grey where that was not measured.
 fn write_face_cloud(context: &Context, first: &Labelled, rows: &[StoneRow]) -> Result<()> {
     let colours = FaceColours::new(rows);
     let by_id: BTreeMap<u32, &StoneRow> = rows.iter().map(|r| (r.stone_id, r)).collect();
     let tiles = &first.ingested.tiles;
-    let Some(bounds) = (0..tiles.tile_count())
-        .map(|t| tiles.bounds(t))
-        .reduce(|a: Bounds, b| a.union(&b))
-    else {
+    let parts: Vec<_> = (0..tiles.tile_count()).map(|t| tiles.bounds(t)).collect();
+    if parts.is_empty() {
         return Ok(());
-    };
+    }
     let crs = coordinate_system(context.project)?;
     let crs = crs.map(|c| c.text());
 
-    write_coloured_laz(
+    context.progress.begin("face cloud", parts.len() as u64);
+    write_coloured_copc(
         &context.out.join(FILE),
-        &bounds,
+        parts,
+        tiles.point_count(),
         &DIMENSIONS,
         crs.as_deref(),
-        |out| {
-            context
-                .progress
-                .each("face cloud", 0..tiles.tile_count(), |tile| {
-                    let labels = first.labels(tile)?;
-                    if labels.stone.iter().any(|s| *s != 0) {
-                        let cloud = tiles.load(tile)?;
-                        for (i, stone) in labels.stone.iter().enumerate().filter(|(_, s)| **s != 0) {
-                            let row = by_id.get(stone).copied();
-                            let motion = row.and_then(|r| r.motion.as_ref());
-                            let mm = motion.map_or([f32::NAN; 5], |m| {
-                                let [a, u, o] = [m.face.x, m.face.y, m.face.z];
-                                [a, u, o, m.displacement.norm(), m.detection_limit_m]
-                                    .map(|v| (v * 1e3) as f32)
-                            });
-                            let numbers = [*stone as f32, mm[0], mm[1], mm[2], mm[3], mm[4]];
-                            out.push(cloud.world(i), colours.of(row), &numbers)?;
-                        }
-                    }
-                    Ok(())
-                })
+        |tile, out| {
+            context.progress.check()?;
+            let labels = first.labels(tile)?;
+            if labels.stone.iter().any(|s| *s != 0) {
+                let cloud = tiles.load(tile)?;
+                for (i, stone) in labels.stone.iter().enumerate().filter(|(_, s)| **s != 0) {
+                    let row = by_id.get(stone).copied();
+                    let motion = row.and_then(|r| r.motion.as_ref());
+                    let mm = motion.map_or([f32::NAN; 5], |m| {
+                        let [a, u, o] = [m.face.x, m.face.y, m.face.z];
+                        [a, u, o, m.displacement.norm(), m.detection_limit_m].map(|v| (v * 1e3) as f32)
+                    });
+                    let numbers = [*stone as f32, mm[0], mm[1], mm[2], mm[3], mm[4]];
+                    out.push(cloud.world(i), colours.of(row), &numbers)?;
+                }
+            }
+            context.progress.advance(1);
+            Ok(())
         },
     )
 }
