@@ -56,17 +56,27 @@ pub fn read_rgb(path: &Path) -> Result<RgbImage, ImageIoError> {
             path: path.to_owned(),
         });
     }
-    let decode = || -> Result<image::RgbImage, ImageError> {
-        let mut reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format()?;
-        let mut limits = Limits::default();
-        limits.max_alloc = Some(MOST_BYTES);
-        reader.limits(limits);
-        Ok(reader.decode()?.into_rgb8())
-    };
-    let decoded = decode().map_err(|source| read_error(path, source))?;
+    decode_rgb(&bytes).map_err(|source| read_error(path, source))
+}
+
+/// As [`read_rgb`], of bytes.
+pub(crate) fn decode_rgb(bytes: &[u8]) -> Result<RgbImage, ImageError> {
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(MOST_BYTES);
+    reader.limits(limits);
+    let decoded = reader.decode()?.into_rgb8();
     let (width, height) = decoded.dimensions();
     let pixels = decoded.pixels().map(|p| p.0).collect();
     Ok(Raster::from_vec(width, height, pixels).unwrap_or_else(|| Raster::filled(0, 0, [0; 3])))
+}
+
+/// Format, width and height, pixels, from the head of the bytes alone.
+pub(crate) fn head_of(bytes: &[u8]) -> Result<(Option<ImageFormat>, [u32; 2]), ImageError> {
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+    let format = reader.format();
+    let (width, height) = reader.into_dimensions()?;
+    Ok((format, [width, height]))
 }
 
 /// Photos in a folder and below, sorted; hidden files and folders are left out.

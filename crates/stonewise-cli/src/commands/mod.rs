@@ -15,6 +15,7 @@ mod info;
 mod init;
 mod outcome;
 mod part;
+mod photos;
 mod report;
 mod run;
 mod schema;
@@ -75,6 +76,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::Init(args) => init::init(&args),
         Command::Studio(args) => studio::studio(&args, printer),
         Command::Schema => schema::schema(),
+        Command::Photos(args) => photos::photos(&args, force, printer),
         Command::Info(args) => info::info(&args),
         Command::Explain(args) => explain::explain(&args),
         Command::Doctor => doctor::doctor(),

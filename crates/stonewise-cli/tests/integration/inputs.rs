@@ -167,6 +167,100 @@ fn info_does_not_repeat_a_false_box() {
     assert!(!sound.contains("wrong"), "{sound}");
 }
 
+/// An E57 file with one photo that has a pose, and `more` photos that have none.
+fn e57_with_photos(path: &Path, more: usize) {
+    let picture = path.with_extension("png");
+    let pixels = stonewise_core::raster::Raster::filled(40, 30, [1u8, 2, 3]);
+    stonewise_io::image_io::write_png_rgb(&picture, &pixels).unwrap();
+    let mut file = e57::E57Writer::from_file(path, "file").unwrap();
+    for i in 0..=more {
+        let mut image = file.add_image(&format!("image {i}")).unwrap();
+        let lens = e57::PinholeImageProperties {
+            width: 40,
+            height: 30,
+            focal_length: 0.01,
+            pixel_width: 0.0005,
+            pixel_height: 0.0005,
+            principal_x: 20.0,
+            principal_y: 15.0,
+        };
+        let bytes = fs::read(&picture).unwrap();
+        image
+            .add_pinhole(e57::ImageFormat::Png, &mut bytes.as_slice(), lens, None)
+            .unwrap();
+        if i == 0 {
+            let (x, y, z) = (1.0, 2.0, 3.0);
+            image.set_transform(e57::Transform {
+                translation: e57::Translation { x, y, z },
+                ..e57::Transform::default()
+            });
+        }
+        image.finalize().unwrap();
+    }
+    file.finalize().unwrap();
+}
+
+#[test]
+fn photos_in_e57_files_become_images_and_cameras_of_a_project() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = folder.path().join("scan.e57");
+    let out = folder.path().join("photos");
+    let photos = |scan: &Path| {
+        let mut command = stonewise();
+        let output = command.arg("photos").arg(scan).arg("--out").arg(&out).output();
+        let output = output.unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let (code, _, log) = photos(&testdata("clouds/two_scans.e57"));
+    assert_eq!(code, Some(1), "{log}");
+    assert!(
+        log.contains("no images in the file") && log.contains("two_scans.e57"),
+        "{log}"
+    );
+    assert!(!out.exists());
+
+    e57_with_photos(&scan, 0);
+    let (code, said, _) = info(std::slice::from_ref(&scan));
+    let expected = format!(
+        "  1 photo inside; to unpack: stonewise photos {} --out DIR\n",
+        scan.display()
+    );
+    assert!(code == 0 && said.contains(&expected), "{said}");
+    let (code, said, log) = photos(&scan);
+    assert_eq!(code, Some(0), "{log}");
+    let line = |key: &str, name: &str| format!("{key} = \"{}/{name}\"\n", out.display()).replace('\\', "/");
+    for expected in [
+        "1 photo of 40 x 30 px\n",
+        &line("images", "images"),
+        &line("cameras", "colmap"),
+    ] {
+        assert!(said.contains(expected), "{expected} is not in {said}");
+    }
+    let (_, said, _) = info(&[out.join("colmap")]);
+    assert!(
+        said.contains("  photo_001.png: 40 x 30 px, f 20.0 px, at (1.000, 2.000, 3.000)\n"),
+        "{said}"
+    );
+
+    // The same scan may come again; what it lacks is said.
+    e57_with_photos(&scan, 2);
+    let (code, said, log) = photos(&scan);
+    assert!(
+        code == Some(3) && said.contains("left out: 2 images without a pose\n"),
+        "{said}{log}"
+    );
+    let output = stonewise().args(["info", "--json"]).arg(&scan).output().unwrap();
+    let all: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let expected = serde_json::json!({ "photos": 1, "panoramas": 0, "not_usable": 2 });
+    assert_eq!(all[0]["images"], expected);
+    // Another scan may not.
+    let other = folder.path().join("other.e57");
+    e57_with_photos(&other, 0);
+    let (code, _, log) = photos(&other);
+    assert!(code == Some(2) && log.contains("--force"), "{log}");
+}
+
 #[test]
 fn usual_slips_in_project_files_are_wrong_usage_with_the_fix() {
     let folder = tempfile::tempdir().unwrap();

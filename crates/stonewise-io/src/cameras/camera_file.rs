@@ -3,6 +3,9 @@
 use super::Remark;
 use stonewise_core::geometry::View;
 
+/// Pixels of the largest photo that is accepted.
+pub(super) const MAX_PIXELS: u64 = 1 << 30;
+
 /// What a camera file holds.
 #[derive(Clone, Debug, Default)]
 pub struct CameraFile {

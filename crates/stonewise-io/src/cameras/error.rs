@@ -1,5 +1,6 @@
 //! What can go wrong with camera files and photo folders.
 
+use crate::image_io::ImageIoError;
 use std::path::{Path, PathBuf};
 
 /// Why cameras or photos could not be read or written.
@@ -85,6 +86,17 @@ pub enum CameraError {
         /// Folder of photos.
         folder: PathBuf,
     },
+    /// No photo inside E57 files.
+    #[error("{problem}: {files}")]
+    NoImages {
+        /// Paths of the files.
+        files: String,
+        /// What there is instead, and the fix.
+        problem: String,
+    },
+    /// A photo cannot be written.
+    #[error(transparent)]
+    Image(#[from] ImageIoError),
     /// Two photos match one camera equally well.
     #[error("camera {camera} matches two photos, {} and {}: rename or remove one", first.display(), second.display())]
     AmbiguousPhoto {

@@ -1,5 +1,5 @@
 //! Posed photos from other programs: Agisoft Metashape, RealityCapture, COLMAP, OpenSfM, Pix4D (also as OPF),
-//! OpenMVG, nerfstudio, Bundler.
+//! OpenMVG, nerfstudio, Bundler; and photos that E57 files hold.
 //!
 //! Whatever the file says is turned into [`View`](stonewise_core::geometry::View)s: world frame of the file,
 //! first pixel centre at (0.5, 0.5), poses that take world to camera. Views keep the order of the file, and a
@@ -8,6 +8,7 @@
 mod bundler;
 mod camera_file;
 mod colmap;
+mod e57;
 mod error;
 mod map_frame;
 mod metashape;
@@ -26,6 +27,10 @@ mod xml;
 
 pub use camera_file::CameraFile;
 pub use colmap::{is_camera_folder, write_colmap};
+pub use e57::{
+    E57_CAMERAS_DIR, E57_IMAGES_DIR, E57ImageCounts, E57Photos, LeftOut, count_e57_images,
+    require_e57_photos, unpack_e57_photos,
+};
 pub use error::CameraError;
 pub use map_frame::MapFrame;
 pub use metashape::write_metashape;

@@ -1,5 +1,6 @@
 //! Camera files of any of the known formats.
 
+use super::camera_file::MAX_PIXELS;
 use super::photo_sizes::PhotoSizes;
 use super::{
     CameraError, CameraFile, MapFrame, bundler, colmap, malformed, metashape, nerfstudio, openmvg, opensfm,
@@ -7,9 +8,6 @@ use super::{
 };
 use std::path::Path;
 use stonewise_core::geometry::View;
-
-/// Pixels of the largest photo that is accepted.
-const MAX_PIXELS: u64 = 1 << 30;
 
 /// Reads a camera file of any of the known formats.
 ///

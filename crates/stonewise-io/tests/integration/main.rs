@@ -11,6 +11,7 @@ mod cameras;
 mod cloud_damage;
 mod cloud_formats;
 mod cloud_points;
+mod e57_photos;
 mod hostile_files;
 mod image_io;
 mod label_survey;

@@ -8,7 +8,8 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
 use stonewise_core::geometry::Bounds;
-use stonewise_io::cloud::{Clock, CloudDetails, Created, Rounding, SourcePoints, cloud_details};
+use stonewise_io::cameras::{E57ImageCounts, count_e57_images};
+use stonewise_io::cloud::{Clock, CloudDetails, CloudFormat, Created, Rounding, SourcePoints, cloud_details};
 use stonewise_io::crs::Crs;
 
 /// Difference of a header's box from that of the points from which on the header is wrong, metres: above all
@@ -22,10 +23,41 @@ const ADJUSTED_S: f64 = 1e9;
 /// Details of a cloud, as `info` prints them.
 pub fn cloud(path: &Path) -> Result<Described> {
     let details = cloud_details(path)?;
-    Ok(Described {
-        text: text(&details),
+    let images = match CloudFormat::of(path)? {
+        CloudFormat::E57 => Some(count_e57_images(&[path.to_path_buf()])?),
+        _ => None,
+    };
+    let mut described = Described {
+        text: text(&details) + &images.as_ref().map_or(String::new(), |i| said_of(i, path)),
         json: json(&details),
-    })
+    };
+    described.json["images"] = json!(images.map(|i| {
+        let others: usize = i.left_out.values().sum();
+        json!({ "photos": i.photos, "panoramas": i.panoramas, "not_usable": others })
+    }));
+    Ok(described)
+}
+
+/// What images an E57 file holds, and the command that unpacks them.
+fn said_of(images: &E57ImageCounts, path: &Path) -> String {
+    let kinds = [(images.photos, "photo"), (images.panoramas, "panorama")];
+    let kinds: Vec<String> = kinds
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, kind)| counted(count, kind))
+        .collect();
+    let mut text = String::new();
+    if !kinds.is_empty() {
+        let (kinds, path) = (kinds.join(" and "), path.display());
+        let _ = writeln!(
+            text,
+            "  {kinds} inside; to unpack: stonewise photos {path} --out DIR"
+        );
+    }
+    for (reason, count) in &images.left_out {
+        let _ = writeln!(text, "  {} {reason}", counted(count, "image"));
+    }
+    text
 }
 
 fn text(details: &CloudDetails) -> String {

@@ -1,0 +1,65 @@
+//! `photos`.
+
+use crate::args::PhotosArgs;
+use crate::commands::Outcome;
+use crate::counted::counted;
+use crate::printer::Printer;
+use anyhow::Result;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+use stonewise::{Error, OutputFolder, Owner};
+use stonewise_io::cameras::{
+    E57_CAMERAS_DIR, E57_IMAGES_DIR, E57Photos, require_e57_photos, unpack_e57_photos,
+};
+
+/// Unpacks the photos that E57 files hold.
+pub fn photos(args: &PhotosArgs, force: bool, printer: &Printer) -> Result<Outcome> {
+    let counts = require_e57_photos(&args.scans).map_err(Error::from)?;
+    let owner = Owner::inputs("photos", &args.scans);
+    let written = [E57_IMAGES_DIR, E57_CAMERAS_DIR, "work"];
+    let folder = OutputFolder::of_inputs(&args.out, &owner, &args.scans, &written, force)?;
+    for path in &counts.without {
+        printer.log(&format!("note: no images in the file: {}", path.display()));
+    }
+    let photos = unpack_e57_photos::<Error>(&args.scans, folder.path(), printer)?;
+    printer.finish();
+    write!(std::io::stdout(), "{}", summary(&photos, &args.out))?;
+    Ok(if photos.left_out.is_empty() {
+        Outcome::Done
+    } else {
+        Outcome::InDoubt
+    })
+}
+
+fn summary(photos: &E57Photos, out: &Path) -> String {
+    let mut sizes = BTreeMap::<_, usize>::new();
+    for view in &photos.views {
+        *sizes.entry((view.camera.width, view.camera.height)).or_default() += 1;
+    }
+    let mut text = String::new();
+    for ((width, height), count) in sizes {
+        let _ = writeln!(text, "{} of {width} x {height} px", counted(count, "photo"));
+    }
+    if photos.panoramas > 0 {
+        let panoramas = counted(photos.panoramas, "panorama");
+        let _ = writeln!(text, "{} of them cut from {panoramas}", 4 * photos.panoramas);
+    }
+    for (reason, count) in &photos.left_out {
+        let _ = writeln!(text, "left out: {} {reason}", counted(count, "image"));
+    }
+    if photos.masked > 0 {
+        let masked = counted(photos.masked, "image");
+        let _ = writeln!(
+            text,
+            "{masked} with a mask of parts that show nothing, which is not applied"
+        );
+    }
+    text.push_str("for the epoch of these scans in a project file in this folder:\n");
+    for (key, name) in [("images", E57_IMAGES_DIR), ("cameras", E57_CAMERAS_DIR)] {
+        let path = out.join(name).display().to_string().replace('\\', "/");
+        let _ = writeln!(text, "{key} = {}", toml::Value::String(path));
+    }
+    text
+}
