@@ -16,7 +16,7 @@ pub fn design(args: &DesignArgs, force: bool, printer: &Printer) -> Result<Outco
         let plan = SurveyPlan::read(&args.project)?;
         let inputs = std::slice::from_ref(&args.project);
         let mut made = vec!["work".to_owned(), "as_planned".to_owned()];
-        made.extend(plan.stations.iter().map(|s| format!("with_{}", s.name)));
+        made.extend(plan.candidates().iter().map(|name| format!("with_{name}")));
         let made: Vec<&str> = made.iter().map(String::as_str).collect();
         let owner = Owner::inputs("design", inputs);
         let folder = OutputFolder::of_inputs(&args.out, &owner, inputs, &made, force)?;

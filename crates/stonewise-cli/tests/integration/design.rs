@@ -3,6 +3,7 @@
 use crate::support::{run, simulated, stonewise};
 use serde_json::Value;
 use std::fs;
+use std::path::{Path, PathBuf};
 use stonewise_core::statistics::median;
 use stonewise_io::table::read_parquet;
 
@@ -117,21 +118,26 @@ reach_m = 1.2
 candidate = true
 "#;
 
-#[test]
-fn the_candidate_that_sees_the_rest_of_a_planned_wall_comes_first() {
-    let dir = tempfile::tempdir().unwrap();
-    let plan = dir.path().join("plan.toml");
-    fs::write(&plan, PLAN).unwrap();
-    let out = dir.path().join("design");
+/// What `design` predicts of a plan, and the folder of its results in `dir`.
+fn designed(dir: &Path, plan: &str) -> (Value, PathBuf) {
+    let file = dir.join("plan.toml");
+    fs::write(&file, plan).unwrap();
+    let out = dir.join("design");
     let mut command = stonewise();
-    command.args(["design", "--quiet"]).arg(&plan);
+    command.args(["design", "--quiet"]).arg(&file);
     let output = command.arg("--out").arg(&out).output().unwrap();
     assert!(
         output.status.success(),
         "{}",
         String::from_utf8_lossy(&output.stderr)
     );
-    let design: Value = serde_json::from_slice(&output.stdout).unwrap();
+    (serde_json::from_slice(&output.stdout).unwrap(), out)
+}
+
+#[test]
+fn the_candidate_that_sees_the_rest_of_a_planned_wall_comes_first() {
+    let dir = tempfile::tempdir().unwrap();
+    let (design, out) = designed(dir.path(), PLAN);
     let added: Vec<&Value> = { design["with_candidate"].as_array().unwrap().iter() }
         .map(|survey| &survey["added"])
         .collect();
@@ -143,7 +149,9 @@ fn the_candidate_that_sees_the_rest_of_a_planned_wall_comes_first() {
     assert!(out.join("design.html").exists());
     // A folder that holds other files is left as it is.
     let mut command = stonewise();
-    command.args(["design", "--quiet"]).arg(&plan);
+    command
+        .args(["design", "--quiet"])
+        .arg(dir.path().join("plan.toml"));
     assert!(
         !command
             .arg("--out")
@@ -153,4 +161,79 @@ fn the_candidate_that_sees_the_rest_of_a_planned_wall_comes_first() {
             .status
             .success()
     );
+}
+
+/// A drone alone whose flights are 6 mm off each; a station, photos and targets may be added.
+const FLOWN: &str = r#"
+[wall]
+width_m = 2.0
+height_m = 1.2
+course_m = 0.28
+aspect = 1.2
+[[instruments]]
+name = "scanner"
+step_rad = 2.5e-3
+[[stations]]
+name = "A"
+along_m = 1.0
+distance_m = 3.0
+candidate = true
+[drone]
+datum_m = 0.006
+drift_m = 0.004
+[photos]
+distance_m = 5.0
+width_px = 900
+height_px = 700
+focal_px = 1100.0
+candidate = true
+[targets]
+error_m = 0.001
+candidate = true
+"#;
+
+#[test]
+fn drone_photos_and_targets_are_planned_like_stations() {
+    let dir = tempfile::tempdir().unwrap();
+    let (design, out) = designed(dir.path(), FLOWN);
+    let with = |name: &str| {
+        let mut surveys = design["with_candidate"].as_array().unwrap().iter();
+        surveys.find(|survey| survey["added"] == name).unwrap()
+    };
+    let sd = |survey: &Value, key: &str| [0, 1, 2].map(|axis| survey[key][axis].as_f64().unwrap());
+    let planned = &design["planned"];
+    assert_eq!(planned["stations"], serde_json::json!([]));
+    assert_eq!((&planned["drone"], &planned["photos"]), (&true.into(), &0.into()));
+    // The error that a flight shares is in every motion twice, once for each epoch; targets take it off.
+    assert_eq!(planned["datum"], "sources", "{planned}");
+    assert!(
+        sd(planned, "sd_mm").iter().all(|sd| *sd > 6.0 * 2f64.sqrt()),
+        "{planned}"
+    );
+    let targets = with("targets");
+    assert_eq!(targets["datum"], "stated");
+    let sd_mm = sd(targets, "sd_mm");
+    assert!(
+        sd_mm.iter().all(|sd| (2f64.sqrt()..6.0).contains(sd)),
+        "{targets}"
+    );
+    assert_eq!(targets["stones"], planned["stones"]);
+    // Photos show the motion in the face better than relief does under 11 mm of noise.
+    let photos = with("photos");
+    assert!(photos["photos"].as_u64().unwrap() >= 4, "{photos}");
+    let in_face = |survey: &Value| {
+        let [along, up, _] = sd(survey, "sd_deformation_mm");
+        along.hypot(up)
+    };
+    assert!(in_face(photos) < in_face(planned), "{planned} {photos}");
+    // A scanner is seven times as sharp, and comes first.
+    let station = &design["with_candidate"][0];
+    assert_eq!(
+        (&station["added"], &station["drone"]),
+        (&"A".into(), &true.into())
+    );
+    let [before, after] = [planned, station].map(|survey| sd(survey, "sd_deformation_mm")[2]);
+    assert!(after < 0.5 * before, "{planned} {station}");
+    let page = fs::read_to_string(out.join("design.html")).unwrap();
+    assert!(page.contains("Stations A; drone") && page.contains("drone; targets"));
 }

@@ -22,7 +22,7 @@ pub use design::{Design, design};
 pub use paper::{Detail, PaperOptions, PaperSurvey, PaperTables, Segmented, paper};
 pub use sensitivity::{Influence, SensitivityOptions, SensitivityPoint, sensitivity};
 pub use survey_plan::{
-    PlanDesign, PlannedInstrument, PlannedRegistration, PlannedStation, PlannedSurvey, SurveyPlan, Weakest,
-    design_plan,
+    PlanDesign, PlannedDrone, PlannedInstrument, PlannedPhotos, PlannedRegistration, PlannedStation,
+    PlannedSurvey, PlannedTargets, SurveyPlan, Weakest, design_plan,
 };
 pub use tune::{Dimension, DimensionError, TuneOptions, Tuned, TunedPoint, default_grid, tune};

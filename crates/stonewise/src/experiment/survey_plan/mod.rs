@@ -1,13 +1,15 @@
-//! What a survey will see that is only planned: a plain wall is simulated, scanned twice from the planned stations, and
+//! What a survey will see that is only planned: a plain wall is simulated, surveyed twice as planned, and
 //! measured as any survey is.
 //!
-//! The wall stands still, so that what the adjustment says of its accuracy is what a survey of such a wall will have. The
-//! same is done with each candidate as one more station; all share the wall and the errors of the stations before it.
+//! The wall stands still, so that what the adjustment says of its accuracy is what a survey of such a wall will
+//! have. The same is done with each candidate in addition; all share the wall and the errors of what is planned.
 
+mod flights;
 mod page;
 mod plan_file;
 mod planned;
 mod squares;
+mod values;
 
 use crate::error::{Error, Result};
 use crate::experiment::predicted::{limits_mm, medians_mm, without_chance};
@@ -18,8 +20,9 @@ use crate::project::Project;
 use crate::results::{RowMotion, StoneRow, read_outlines};
 use crate::storage::step::Key;
 use crate::storage::store::{Keeps, StepStore};
+pub use flights::{PlannedDrone, PlannedPhotos};
 use page::page;
-pub use plan_file::{PlannedInstrument, PlannedRegistration, PlannedStation, SurveyPlan};
+pub use plan_file::{PlannedInstrument, PlannedRegistration, PlannedStation, PlannedTargets, SurveyPlan};
 pub use planned::{PlanDesign, PlannedSurvey};
 use squares::Squares;
 pub use squares::Weakest;
@@ -34,23 +37,22 @@ use stonewise_simulate::{
 
 /// How far a station may stand off its planned place, metres.
 const PLACEMENT_M: f64 = 0.2;
-/// Distance of the photos from the face and from each other along and up, metres.
-const PHOTO_M: [f64; 3] = [8.0, 4.0, 3.0];
 
-/// Predicts what the stations of a plan will see, and with each candidate in addition; writes `design.json` and
+/// Predicts what a planned survey will see, and with each candidate in addition; writes `design.json` and
 /// `design.html` into `out`. An interrupted prediction goes on where it stopped.
 ///
 /// # Errors
 /// The plan describes no wall that can be built, a survey shows no stone, a file cannot be written, interruption.
 pub fn design_plan(plan: &SurveyPlan, seed: u64, out: &Path, progress: &dyn Progress) -> Result<PlanDesign> {
     let store = Arc::new(StepStore::new(&out.join("work"), Keeps::Every)?);
-    let candidates: Vec<&PlannedStation> = plan.stations.iter().filter(|s| s.candidate).collect();
+    let candidates = plan.candidates();
     progress.begin("planned surveys", 1 + candidates.len() as u64);
-    let wall = Wall::new(&scene(plan, None, seed).wall);
+    let wall = Wall::new(&simulation(plan, seed).scene.wall);
     let mut surveys = Vec::new();
 
-    for added in std::iter::once(None).chain(candidates.into_iter().map(Some)) {
-        surveys.push(survey(plan, added, seed, &wall, out, &store, progress)?);
+    for added in std::iter::once(None).chain(candidates.iter().map(Some)) {
+        let taking_part = plan.with(added.map(String::as_str));
+        surveys.push(survey(&taking_part, added, seed, &wall, out, &store, progress)?);
         progress.advance(1);
     }
 
@@ -62,7 +64,7 @@ pub fn design_plan(plan: &SurveyPlan, seed: u64, out: &Path, progress: &dyn Prog
     let mut each = maps.iter().map(|(survey, _)| survey.clone());
     let planned = each
         .next()
-        .ok_or_else(|| Error::Survey("a plan without stations".to_owned()))?;
+        .ok_or_else(|| Error::Survey("a plan without surveys".to_owned()))?;
     let design = PlanDesign {
         seed,
         planned,
@@ -73,10 +75,10 @@ pub fn design_plan(plan: &SurveyPlan, seed: u64, out: &Path, progress: &dyn Prog
     Ok(design)
 }
 
-/// Simulates two surveys of the still wall and measures them.
+/// Simulates two surveys of the still wall with all that the plan names, and measures them.
 fn survey(
     plan: &SurveyPlan,
-    added: Option<&PlannedStation>,
+    added: Option<&String>,
     seed: u64,
     wall: &Wall,
     out: &Path,
@@ -84,8 +86,8 @@ fn survey(
     progress: &dyn Progress,
 ) -> Result<(PlannedSurvey, Squares)> {
     let quiet = Quiet(progress);
-    let name = added.map_or("as_planned".to_owned(), |s| format!("with_{}", s.name));
-    let params = simulation(plan, added, seed);
+    let name = added.map_or("as_planned".to_owned(), |name| format!("with_{name}"));
+    let params = simulation(plan, seed);
     let (dir, _) = store.step("survey", Key::new("survey", &params, &[]), &[], |dir| {
         let written = write_survey(&dir.file("survey"), &params, &quiet);
         written.map(drop).map_err(|error| match error {
@@ -93,9 +95,7 @@ fn survey(
             error => Error::Simulate(error.into()),
         })
     })?;
-    let mut project = Project::read(&dir.file("survey").join("stonewise.toml"))?;
-    // The photos show nothing but where stones are.
-    project.settings.registration.photos.enabled = false;
+    let project = project(plan, &dir.file("survey"))?;
     let folder = out.join(&name);
     let context = Context::with_store(&project, &folder, Arc::clone(store), &quiet)?;
     let (run, later) = (Run::new(&context, Until::Registered), EpochId::at(1));
@@ -107,14 +107,20 @@ fn survey(
         .collect();
     if found.is_empty() {
         return Err(Error::Survey(format!(
-            "{name}: no stone is measured; do the stations stand in front of the wall, with beams near enough to each other?"
+            "{name}: no stone is measured; do stations and strips lie in front of the wall, with beams near \
+             enough to each other?"
         )));
     }
 
     let squares = Squares::new(wall, plan.square_m, &found);
     let summary = PlannedSurvey {
-        stations: stations(plan, added).map(|s| s.name.clone()).collect(),
-        added: added.map(|s| s.name.clone()),
+        stations: plan.stations.iter().map(|s| s.name.clone()).collect(),
+        drone: plan.drone.is_some(),
+        photos: match plan.photos {
+            Some(_) => params.photos.columns * params.photos.rows,
+            None => 0,
+        },
+        added: added.cloned(),
         stones: [squares.stones(), found.len()],
         datum: measured.datum.state,
         sd_mm: medians_mm(&found, |(_, m), axis| Some(m.face_sd[axis])),
@@ -127,46 +133,56 @@ fn survey(
     Ok((summary, squares))
 }
 
-/// The stations of the plan, and one candidate after them.
-fn stations<'a>(
-    plan: &'a SurveyPlan,
-    added: Option<&'a PlannedStation>,
-) -> impl Iterator<Item = &'a PlannedStation> {
-    plan.stations.iter().filter(|s| !s.candidate).chain(added)
-}
-
-fn scene(plan: &SurveyPlan, added: Option<&PlannedStation>, seed: u64) -> SceneParams {
-    SceneParams {
-        wall: plan.wall.clone(),
-        surroundings: SurroundingsParams::none(),
-        tls: Some(TlsParams {
-            registration_m: plan.registration.shift_m,
-            registration_rad: plan.registration.rotation_rad,
-            placement_m: PLACEMENT_M,
-            places: stations(plan, added).map(|s| plan.place(s)).collect(),
-            ..TlsParams::default()
-        }),
-        ..SceneParams::default()
+/// The project of a simulated survey, with what the plan knows of it.
+fn project(plan: &SurveyPlan, folder: &Path) -> Result<Project> {
+    let mut project = Project::read(&folder.join("stonewise.toml"))?;
+    let registration = &mut project.settings.registration;
+    registration.photos.enabled = plan.photos.is_some();
+    if let Some(error_px) = plan.photos.as_ref().and_then(|p| p.pose_error_px) {
+        registration.photos.pose_error_px = error_px;
     }
-    .seeded(seed)
+    // Of a wall that stands still, only what is known of the frame counts, not how far off it was.
+    registration.epoch_error_m = plan.targets.as_ref().map(|t| t.error_m);
+    match &plan.drone {
+        Some(drone) if plan.stations.is_empty() => registration.observers.shared_error_m = drone.datum_m,
+        // The simulator's project names the cloud of the stations alone.
+        Some(_) => {
+            for number in 1..=2 {
+                let cloud = folder.join(format!("epoch{number}/cloud_uav.laz"));
+                project.epochs[EpochId::at(number - 1)].clouds.push(cloud);
+            }
+        }
+        None => (),
+    }
+    Ok(project)
 }
 
-fn simulation(plan: &SurveyPlan, added: Option<&PlannedStation>, seed: u64) -> SurveyParams {
-    let [distance_m, along_m, up_m] = PHOTO_M;
-    let count = |size_m: f64, step_m: f64| (size_m / step_m).ceil().clamp(2.0, 1e3) as u32;
+fn simulation(plan: &SurveyPlan, seed: u64) -> SurveyParams {
+    let stations = TlsParams {
+        registration_m: plan.registration.shift_m,
+        registration_rad: plan.registration.rotation_rad,
+        placement_m: PLACEMENT_M,
+        places: plan.stations.iter().map(|s| plan.place(s)).collect(),
+        ..TlsParams::default()
+    };
+    let size_m = [plan.wall.width_m, plan.wall.height_m];
     SurveyParams {
         name: "Planned survey".to_owned(),
         masks: MaskFiles::Png,
-        scene: scene(plan, added, seed),
-        photos: PhotoParams {
-            columns: count(plan.wall.width_m, along_m),
-            rows: count(plan.wall.height_m, up_m),
-            width: 1200,
-            height: 900,
-            focal_px: 1200.0,
-            distance_m,
-            rendered: false,
-            ..PhotoParams::default()
+        scene: SceneParams {
+            wall: plan.wall.clone(),
+            surroundings: SurroundingsParams::none(),
+            tls: (!plan.stations.is_empty()).then_some(stations),
+            uav: plan.drone.as_ref().map(PlannedDrone::params),
+            ..SceneParams::default()
+        }
+        .seeded(seed),
+        photos: match &plan.photos {
+            Some(photos) => photos.params(size_m),
+            None => PhotoParams {
+                rendered: false,
+                ..PlannedPhotos::that_find().params(size_m)
+            },
         },
         ..SurveyParams::default()
     }

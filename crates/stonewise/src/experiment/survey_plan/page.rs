@@ -4,6 +4,7 @@ use super::planned::PlannedSurvey;
 use super::squares::Squares;
 use crate::experiment::predicted::in_table;
 use crate::figure::{Axis, GREY, Item, Page, Plot, Ramp, table};
+use crate::results::records::DatumState;
 use stonewise_core::registration::ZONE_EXTENTS_M;
 
 /// Width of a map, pixels.
@@ -43,7 +44,7 @@ pub(super) fn page(surveys: &[(PlannedSurvey, Squares)]) -> String {
         .collect();
     page.html(&table(
         &[
-            "stations",
+            "survey",
             "stones measured",
             "weakest square",
             "squares not seen",
@@ -61,10 +62,20 @@ pub(super) fn page(surveys: &[(PlannedSurvey, Squares)]) -> String {
         range: [0.0, if largest > 0.0 { largest } else { 1.0 }],
     };
     for (survey, squares) in surveys {
-        page.heading(&format!("Stations {}", survey.stations.join(", ")));
+        page.heading(&sources(survey));
         page.html(&map(squares, ramp));
     }
     page.finish()
+}
+
+/// What measures, such as `Stations A, B; drone; 6 photos`.
+fn sources(survey: &PlannedSurvey) -> String {
+    let stations = (!survey.stations.is_empty()).then(|| format!("Stations {}", survey.stations.join(", ")));
+    let drone = survey.drone.then(|| "drone".to_owned());
+    let photos = (survey.photos > 0).then(|| format!("{} photos", survey.photos));
+    let targets = (survey.datum == DatumState::Stated).then(|| "targets".to_owned());
+    let all: Vec<String> = [stations, drone, photos, targets].into_iter().flatten().collect();
+    all.join("; ")
 }
 
 fn map(squares: &Squares, ramp: Ramp) -> String {

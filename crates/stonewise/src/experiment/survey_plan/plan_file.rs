@@ -1,12 +1,14 @@
-//! The file of a planned survey: a plain model of the wall, instruments, and stations.
+//! The file of a planned survey: a plain model of the wall, instruments, stations, and what else may measure.
 
+use super::flights::{PlannedDrone, PlannedPhotos};
+use super::values::{not_negative, positive};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
 use stonewise_simulate::{BeamParams, StationPlace, WallParams};
 
-/// A wall that is not surveyed yet, and the stations that may survey it.
+/// A wall that is not surveyed yet, and what may survey it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurveyPlan {
@@ -22,8 +24,21 @@ pub struct SurveyPlan {
     #[serde(default)]
     pub instruments: Vec<PlannedInstrument>,
     /// Stations, those that are only candidates among them.
+    #[serde(default)]
     pub stations: Vec<PlannedStation>,
+    /// Lidar under a drone.
+    #[serde(default)]
+    pub drone: Option<PlannedDrone>,
+    /// Photos that measure; without them, photos only show where the stones are.
+    #[serde(default)]
+    pub photos: Option<PlannedPhotos>,
+    /// Stable targets.
+    #[serde(default)]
+    pub targets: Option<PlannedTargets>,
 }
+
+/// What the drone, the photos and the targets are called where one of them is added.
+const NAMES: [&str; 3] = ["drone", "photos", "targets"];
 
 fn square_m() -> f64 {
     1.0
@@ -46,6 +61,17 @@ impl Default for PlannedRegistration {
             rotation_rad: 2e-5,
         }
     }
+}
+
+/// Stable targets, by which every survey is brought into the frame of the first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlannedTargets {
+    /// Error of the frame of a survey that they leave, per axis, standard deviation, metres.
+    pub error_m: f64,
+    /// Whether they are one of those things that the survey may get in addition.
+    #[serde(default)]
+    pub candidate: bool,
 }
 
 /// A class of scanner.
@@ -151,19 +177,14 @@ impl SurveyPlan {
     }
 
     fn check(&self) -> std::result::Result<(), String> {
-        let positive = |key: String, value: f64| match value.is_finite() && value > 0.0 {
-            true => Ok(()),
-            false => Err(format!("{key} = {value}: a positive number is needed")),
-        };
-        positive("square_m".to_owned(), self.square_m)?;
-        let not_negative = |key: String, value: f64| match value.is_finite() && value >= 0.0 {
-            true => Ok(()),
-            false => Err(format!("{key} = {value}: a number is needed, 0 or larger")),
-        };
-        not_negative("registration.shift_m".to_owned(), self.registration.shift_m)?;
+        positive("square_m", self.square_m)?;
+        not_negative("registration.shift_m", self.registration.shift_m)?;
+        not_negative("registration.rotation_rad", self.registration.rotation_rad)?;
+        self.drone.as_ref().map_or(Ok(()), PlannedDrone::check)?;
+        self.photos.as_ref().map_or(Ok(()), PlannedPhotos::check)?;
         not_negative(
-            "registration.rotation_rad".to_owned(),
-            self.registration.rotation_rad,
+            "targets.error_m",
+            self.targets.as_ref().map_or(0.0, |t| t.error_m),
         )?;
         for i in &self.instruments {
             let key = |name: &str| format!("{name} of instrument {:?}", i.name);
@@ -185,6 +206,12 @@ impl SurveyPlan {
                     s.name
                 ));
             }
+            if NAMES.contains(&s.name.as_str()) {
+                return Err(format!(
+                    "station {:?}: results of the plan's {} have this name; rename the station",
+                    s.name, s.name
+                ));
+            }
             let key = |name: &str| format!("{name} of station {:?}", s.name);
             positive(key("distance_m"), s.distance_m)?;
             not_negative(key("reach_m"), s.reach_m)?;
@@ -200,10 +227,43 @@ impl SurveyPlan {
                 ));
             }
         }
-        match self.stations.iter().any(|s| !s.candidate) {
-            true => Ok(()),
-            false => Err("at least one of the [[stations]] must be no candidate".to_owned()),
+        let planned = self.with(None);
+        match planned.stations.is_empty() && planned.drone.is_none() {
+            true => Err(
+                "one of the [[stations]] or the [drone] must be no candidate: nothing scans the wall"
+                    .to_owned(),
+            ),
+            false => Ok(()),
         }
+    }
+
+    /// Names of what may be added: those of stations, and `drone`, `photos` and `targets`.
+    pub fn candidates(&self) -> Vec<String> {
+        let stations = self
+            .stations
+            .iter()
+            .filter(|s| s.candidate)
+            .map(|s| s.name.clone());
+        let others = [
+            self.drone.as_ref().is_some_and(|d| d.candidate),
+            self.photos.as_ref().is_some_and(|p| p.candidate),
+            self.targets.as_ref().is_some_and(|t| t.candidate),
+        ];
+        let others = NAMES.into_iter().zip(others).filter(|(_, candidate)| *candidate);
+        let others = others.map(|(name, _)| name.to_owned());
+        stations.chain(others).collect()
+    }
+
+    /// The plan with what takes part alone: what is no candidate, then the one that is added.
+    pub fn with(&self, added: Option<&str>) -> Self {
+        let is_in = |name: &str, candidate: bool| !candidate || added == Some(name);
+        let mut plan = self.clone();
+        plan.stations.retain(|s| is_in(&s.name, s.candidate));
+        plan.stations.sort_by_key(|s| s.candidate);
+        plan.drone = plan.drone.filter(|d| is_in(NAMES[0], d.candidate));
+        plan.photos = plan.photos.filter(|p| is_in(NAMES[1], p.candidate));
+        plan.targets = plan.targets.filter(|t| is_in(NAMES[2], t.candidate));
+        plan
     }
 
     /// A station as the simulator places it.
@@ -288,5 +348,54 @@ mod tests {
         refused("candidate", "instrument = \"near\"\ncandidate", "\"near\"");
         refused("along_m = 2.0", "along_m = 2.0\ncandidate = true", "no candidate");
         refused("spot_m", "dot_m", "dot_m");
+        refused("\"B\"", "\"drone\"", "rename the station");
+        let added = |table: &str, named: &str| refused("[wall]", &format!("{table}\n[wall]"), named);
+        added("[drone]\nstrips = 0", "drone.strips = 0");
+        added("[drone]\nspacing_m = 0.0", "drone.spacing_m");
+        added("[drone]\ndatum_m = -0.001", "drone.datum_m");
+        added("[photos]\ncolumns = 0", "photos.columns = 0");
+        added("[photos]\nwidth_px = 8", "photos.width_px = 8");
+        added("[photos]\npose_error_px = nan", "photos.pose_error_px = NaN");
+        added("[targets]\nerror_m = -1.0", "targets.error_m = -1");
+        added("[targets]", "error_m");
+    }
+
+    #[test]
+    fn a_plan_needs_something_that_scans_the_wall() {
+        let check = |tables: &str| {
+            toml::from_str::<SurveyPlan>(&format!("[wall]\n{tables}"))
+                .unwrap()
+                .check()
+        };
+        assert!(check("[photos]").unwrap_err().contains("nothing scans the wall"));
+        assert!(check("[drone]\ncandidate = true").is_err());
+        check("[drone]").unwrap();
+    }
+
+    #[test]
+    fn a_candidate_follows_what_is_planned() {
+        let others = "[drone]\ncandidate = true\n[photos]\n[targets]\nerror_m = 0.001\ncandidate = true\n";
+        let mut plan: SurveyPlan = toml::from_str(&format!("{others}{PLAN}")).unwrap();
+        plan.stations.rotate_left(1);
+        assert_eq!(plan.candidates(), ["B", "drone", "targets"]);
+        let taking_part = |added: Option<&str>| {
+            let plan = plan.with(added);
+            let names: Vec<String> = plan.stations.iter().map(|s| s.name.clone()).collect();
+            (
+                names.join(" "),
+                [
+                    plan.drone.is_some(),
+                    plan.photos.is_some(),
+                    plan.targets.is_some(),
+                ],
+            )
+        };
+        assert_eq!(taking_part(None), ("A".to_owned(), [false, true, false]));
+        assert_eq!(taking_part(Some("B")), ("A B".to_owned(), [false, true, false]));
+        assert_eq!(taking_part(Some("drone")), ("A".to_owned(), [true, true, false]));
+        assert_eq!(
+            taking_part(Some("targets")),
+            ("A".to_owned(), [false, true, true])
+        );
     }
 }

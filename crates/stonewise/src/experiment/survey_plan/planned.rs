@@ -4,12 +4,16 @@ use super::squares::Weakest;
 use crate::results::records::DatumState;
 use serde::Serialize;
 
-/// What planned stations will see.
+/// What a planned survey will see.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlannedSurvey {
     /// Names of the stations.
     pub stations: Vec<String>,
-    /// The candidate among them; absent for the survey as it is planned.
+    /// Whether a lidar under a drone scans the wall.
+    pub drone: bool,
+    /// Number of photos that measure, in each epoch.
+    pub photos: u32,
+    /// What is added: the name of a station, `drone`, `photos` or `targets`; absent for the survey as it is planned.
     pub added: Option<String>,
     /// Stones of the wall above ground, and those of them that will be measured.
     pub stones: [usize; 2],
