@@ -59,7 +59,7 @@ fn write_face_cloud(context: &Context, first: &Labelled, rows: &[StoneRow]) -> R
     write_coloured_copc(
         &context.out.join(FILE),
         parts,
-        tiles.point_count(),
+        tiles.surveyed.point_count(),
         &DIMENSIONS,
         crs.as_deref(),
         |tile, out| {
