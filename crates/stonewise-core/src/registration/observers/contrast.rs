@@ -12,11 +12,11 @@ use crate::registration::adjustment::observation::surface::{
 use crate::registration::adjustment::stone_vector::StoneVector;
 use crate::registration::points::{PairPoints, face_spacing};
 use crate::statistics::upper_median;
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Parameters of the comparison of an epoch's sources.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -71,6 +71,11 @@ impl Params for ContrastParams {
 const NOISE_SAMPLE: usize = 32;
 /// Rounds in which the sources' common differences are found and removed before the stones are compared.
 const ALIGNMENTS: usize = 3;
+/// Share of the face, seen along its normal, that another source must show as well. A source that shows another side of
+/// a stone at a corner shows the edge of this face alone.
+const LEAST_OVERLAP: f64 = 0.25;
+/// Cells by which this share is counted, in distances of neighbouring points.
+const OVERLAP_SPACINGS: f64 = 2.0;
 /// Standard deviation that stands for "not seen", metres: keeps a flat stone's covariance finite.
 const UNSEEN_M: f64 = 0.1;
 
@@ -129,7 +134,9 @@ impl Comparison {
             .filter(|s| sources[s.source].epoch == epoch && s.points.len() >= params.min_points)
             .collect();
         seen.sort_by_key(|s| (std::cmp::Reverse(s.points.len()), s.source));
-        let (reference, others) = seen.split_first().filter(|(_, others)| !others.is_empty())?;
+        let reference = *seen.first()?;
+        seen.retain(|s| overlap([&reference.points, &s.points], &stone.normal) >= LEAST_OVERLAP);
+        let (_, others) = seen.split_first().filter(|(_, others)| !others.is_empty())?;
         let frame = FaceFrame::from_normal(&stone.normal).face_from_world();
 
         let pair = |other: &&SourcePoints| {
@@ -307,6 +314,26 @@ fn common_noise(
         .map(|c| (&c.pairs[0], c.motion(&c.shift(0, shifts))))
         .collect();
     estimate_noise(&sample, start, layout)
+}
+
+/// Share of the face with points of the first cloud where the second has points, too, both seen along the normal.
+fn overlap(clouds: [&Cloud; 2], normal: &Vector3<f64>) -> f64 {
+    let spacing_m = clouds
+        .map(|cloud| face_spacing(cloud, normal))
+        .into_iter()
+        .fold(0.0, f64::max);
+    let frame = FaceFrame::from_normal(normal);
+    let [first, second] = clouds.map(|cloud| {
+        let cell = |p: Point3<f64>| {
+            let at =
+                |axis: &Vector3<f64>| (p.coords.dot(axis) / (OVERLAP_SPACINGS * spacing_m)).floor() as i64;
+            (at(&frame.along), at(&frame.up))
+        };
+        (0..cloud.len())
+            .map(|i| cell(cloud.world(i)))
+            .collect::<BTreeSet<_>>()
+    });
+    first.intersection(&second).count() as f64 / first.len().max(1) as f64
 }
 
 /// Evenly spaced points, so that no more than `most` remain.

@@ -115,6 +115,8 @@ const SIGNIFICANT: f64 = 2.71;
 const FACTORS: [f64; 9] = [-1.2, -0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9, 1.2];
 /// Factors whose posterior weight is a smaller share of the best one's are left out.
 const LEAST_WEIGHT: f64 = 1e-3;
+/// Rounds in which stones that are far off lose weight before the variances are estimated.
+const GROSS_ROUNDS: usize = 5;
 /// Error of a source on a plane as a whole, as a share of that of a single cell: most of it differs with
 /// incidence and surface.
 const PLANE_SHARE: f64 = 0.5;
@@ -292,6 +294,7 @@ fn estimated(
     if within.iter().all(Vec::is_empty) {
         return Ok((expected, 0.0));
     }
+    leave_out_gross(unknowns, within, &expected);
     let mut components = expected;
 
     for round in 0..2 {
@@ -321,6 +324,27 @@ fn estimated(
         .zip(deviance(&components))
         .map_or(0.0, |(without, with)| without - with);
     Ok((components, gain))
+}
+
+/// Takes the weight off stones that are far off whatever rigid errors the sources have, so that they do not make the
+/// variances large.
+fn leave_out_gross(unknowns: &Unknowns, within: &mut [Vec<Observation>; 2], expected: &ObserverComponents) {
+    let prior = Prior::new(&opened(*expected), 0.0);
+    for _ in 0..GROSS_ROUNDS {
+        let all: Vec<&Observation> = within.iter().flatten().collect();
+        let problem = Problem::new(unknowns, &all);
+        let weights = problem
+            .mean(&prior, expected)
+            .map(|mean| problem.gross_weights(&mean, expected));
+        let Some(weights) = weights else {
+            return;
+        };
+        let observations = within.iter_mut().flatten();
+        observations.zip(&weights).for_each(|(o, w)| o.weight = *w);
+        if weights.iter().all(|w| *w == 1.0) {
+            return;
+        }
+    }
 }
 
 /// Components of sources whose errors only stable areas show.

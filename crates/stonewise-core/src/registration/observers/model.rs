@@ -4,6 +4,7 @@ use super::components::{MergedDrift, ObserverComponents, SensorClass, Stretch};
 use super::observation::Observation;
 use super::sight::{Sight, Source, StablePlane, Target};
 use crate::linalg::DenseFactor;
+use crate::statistics::upper_median;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Point3, Vector3};
 use std::collections::BTreeMap;
 
@@ -503,6 +504,14 @@ impl<'a> Problem<'a> {
         };
         let misfits = self.misfits(mean, components);
         misfits.into_iter().zip(&self.designs).map(weight).collect()
+    }
+
+    /// The same where the variances are not known yet: misfits count against their median.
+    pub fn gross_weights(&self, mean: &DVector<f64>, components: &ObserverComponents) -> Vec<f64> {
+        let misfits = self.misfits(mean, components);
+        let usual = upper_median(&mut misfits.clone()).unwrap_or(1.0).max(1.0);
+        let weight = |misfit: f64| (MISFIT * usual / misfit).min(1.0);
+        misfits.into_iter().map(weight).collect()
     }
 
     /// Squared standardised residual of each observation per difference, at `mean`.

@@ -580,6 +580,63 @@ fn sources_without_errors_leave_the_datum_unknown() {
     );
 }
 
+/// The errors that are found where the points of the second source of each epoch on some stones are others.
+fn with_others(
+    is_other: impl Fn(usize) -> bool,
+    other: impl Fn(usize, Point3<f64>) -> Point3<f64>,
+) -> EpochErrors {
+    let mut stones = wall(&ERRORS, 0.001, 3);
+    for (k, stone) in stones.iter_mut().enumerate().filter(|(k, _)| is_other(*k)) {
+        for sight in &mut stone.sights {
+            if sight.source % 2 == 1 {
+                let points = (0..sight.points.len()).map(|i| other(k, sight.points.world(i)));
+                sight.points = Cloud::from_world(stone.centroid, points.collect::<Vec<_>>());
+            }
+        }
+    }
+    let sources = sources(2);
+    let pair = EpochPair::new(&sources, &stones, 0.001);
+    epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap()
+}
+
+#[test]
+fn sources_that_show_two_sides_of_a_corner_are_not_compared_there() {
+    // The last stone of each course has a second face at its right edge.
+    let at_corner = |k: usize| k % 5 == 4;
+    let flank = |_, p: Point3<f64>| Point3::new(1.2 - p.y - 0.12, 1.32 + p.x, p.z);
+    let (all, found) = (with_others(|_| false, flank), with_others(at_corner, flank));
+    assert_eq!((all.observations, found.observations), ([20, 20, 0], [16, 16, 0]));
+    let rotation_m = |e: &EpochErrors| e.components.unwrap().rotation_m;
+    assert!(
+        rotation_m(&found) < 2.0 * rotation_m(&all),
+        "{:?}",
+        found.components
+    );
+}
+
+#[test]
+fn a_few_stones_that_a_source_shows_wrong_leave_the_errors_of_the_others() {
+    let moved = |k: usize, p: Point3<f64>| p + Vector3::new(0.02, 0.0, 0.01) * (k as f64 / 6.0 - 1.0);
+    let (all, found) = (with_others(|_| false, moved), with_others(|k| k % 6 == 2, moved));
+    let components = found.components.unwrap();
+    assert!(
+        components.rotation_m < 2e-4 && components.noise_scale < 1.5,
+        "{components:?}"
+    );
+    assert!(
+        components.nugget_m.into_iter().all(|m| m < 6e-4),
+        "{components:?}"
+    );
+    for (found, expected) in found.at.iter().zip(&all.at) {
+        assert!(
+            (found.mean - expected.mean).norm() < 2e-4,
+            "{} {}",
+            found.mean,
+            expected.mean
+        );
+    }
+}
+
 #[test]
 fn merged_points_are_as_uncertain_against_each_other_as_their_dense_covariance_less_a_rigid_motion() {
     let places: Vec<Point3<f64>> = (0..60)
