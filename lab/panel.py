@@ -96,20 +96,19 @@ class Cloud:
             self.registration[source] = turn, random.normal(0, REGISTRATION_M, 3)
         self.places = self.registered(self.places, self.source)
 
-    def close(self, radius, random):
-        """Bends the wall to a tower, which four stations scan; the wall as it was, with the ground.
+    def close(self, bend, random):
+        """Bends the wall as it is told, for four stations; the wall as it was, with the ground.
 
-        The ends of the wall do not meet. The new ground is three metres wide.
+        The ends of the wall of a tower do not meet. The new ground is three metres wide.
         """
         self.keep((abs(self.places[:, 0]) < FACE_M) & (self.places[:, 2] > FOOT_M))
-        ground = random.random((60000, 3)) * [3.0, 2 * np.pi * radius, 0.0]
-        ground[:, 1] -= np.pi * radius
+        ground = random.random((60000, 3)) * [3.0, 2 * np.pi * bend.radius, 0.0]
+        ground[:, 1] -= np.pi * bend.radius
         self.add(ground, 20000, NO_STONE, random)
         flat = self.places
-        angle, out = flat[:, 1] / radius, radius + flat[:, 0]
-        self.places = np.column_stack([out * np.cos(angle), out * np.sin(angle), flat[:, 2]])
+        self.places = bend.bent(flat)
         # Neighbouring stations overlap.
-        towards = angle + random.normal(0, 0.25, len(angle))
+        towards = flat[:, 1] / bend.radius + random.normal(0, 0.25, len(flat))
         self.source = (np.floor(towards / (np.pi / 2)) % 4 + 1).astype(np.uint16)
         return flat
 
@@ -148,6 +147,27 @@ class Cloud:
         self.stone = np.append(self.stone, np.full(len(places), stone))
 
 
+@dataclass(frozen=True)
+class Bend:
+    """How a wall is bent to a tower of this radius, or folded to a square pier of the same girth."""
+
+    radius: float
+    square: bool = False
+
+    def turns(self, along):
+        """How far the wall is turned at these places along it, radians."""
+        turns = along / self.radius
+        return np.round(turns / (np.pi / 2)) * (np.pi / 2) if self.square else turns
+
+    def bent(self, flat):
+        """Where these places on the plane wall are on the bent one."""
+        turns = self.turns(flat[:, 1])
+        out = self.radius * (np.pi / 4 if self.square else 1.0) + flat[:, 0]
+        aside = flat[:, 1] - turns * self.radius
+        cos, sin = np.cos(turns), np.sin(turns)
+        return np.column_stack([out * cos - aside * sin, out * sin + aside * cos, flat[:, 2]])
+
+
 @dataclass
 class Scene:
     """A simulated survey, its two clouds being edited."""
@@ -162,8 +182,8 @@ class Scene:
     lost: list[int] = field(default_factory=list)
     # Motion of all flanks.
     flanks: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    # Of a tower: its radius, and the points of the first cloud on the wall before it was bent.
-    radius: float | None = None
+    # Of a tower or pier: its shape, and the points of the first cloud on the wall before it was bent.
+    bend: Bend | None = None
     flat: np.ndarray | None = None
     # Rotation vector and shift of the second epoch's frame.
     frame: tuple | None = None
@@ -193,8 +213,8 @@ class Scene:
         for motion in self.moved:
             motions[chosen] += motion(places)
         motions[cloud.stone == FLANK] = self.flanks
-        if self.radius:
-            motions = rotate(motions, about_z(all_places[:, 1] / self.radius))
+        if self.bend:
+            motions = rotate(motions, about_z(self.bend.turns(all_places[:, 1])))
         return motions
 
 
@@ -501,6 +521,7 @@ HOLLOW = {"plan_radius_m": 8.0, "width_m": 4.0}
 CONVEX = {"plan_radius_m": -8.0, "width_m": 4.0}
 PLUMB = {"batter": 0.0}
 AROUND = {"width_m": 12.0}
+TOWER, PIER = Bend(2.0), Bend(6 / np.pi, square=True)
 MOVING = {"expected": "attention", "surroundings": NO_ANNEX}
 
 
@@ -519,7 +540,7 @@ class Survey:
     spacing: float = 0.006  # of terrestrial scans
     noise: float | None = None  # of ranges; the simulator's own if none
     scale: float = 1e-6  # to which coordinates are rounded
-    radius: float | None = None  # of the tower to which the wall is bent
+    bend: Bend | None = None  # to a tower or a pier
     project: str = ""  # further lines of the project file
 
     @property
@@ -632,7 +653,8 @@ SURVEYS = [
     Survey("s_ivy", 40, edits=[cover(**IVY, share=0.8)]),
     Survey("s_ivy_thin", 94, edits=[cover(**IVY, share=0.4)]),
     Survey("m_ivy", 93, edits=[cover(**IVY, share=0.8)]),
-    Survey("s_tower", 901, [loose(3, 0.012)], wall=PLUMB | AROUND, surroundings=BARE, radius=2.0),
+    Survey("s_tower", 901, [loose(3, 0.012)], wall=PLUMB | AROUND, surroundings=BARE, bend=TOWER),
+    Survey("s_pier", 902, [loose(3, 0.012)], wall=PLUMB | AROUND, surroundings=BARE, bend=PIER),
     # Parts before or behind the face.
     Survey("s_recess", 42, edits=[recess(0.0)]),
     *(
@@ -762,15 +784,15 @@ def read(survey, folder):
         path = folder / f"epoch{epoch}/cloud_{sensor}.laz"
         truth = folder / f"truth/epoch{epoch}_cloud_{sensor}_truth.laz"
         clouds.append(Cloud.read(path, truth))
-        if survey.radius:
-            flat.append(clouds[-1].close(survey.radius, random))
+        if survey.bend:
+            flat.append(clouds[-1].close(survey.bend, random))
         if sensor == "tls":
             clouds[-1].register(random)
     scene = Scene(clouds, stones, survey.wall.get("batter", 0.2), random)
-    if survey.radius:
-        scene.radius, scene.flat = survey.radius, flat[0]
+    if survey.bend:
+        scene.bend, scene.flat = survey.bend, flat[0]
         normal = ["nx", "ny", "nz"]
-        turn = about_z(stones["cy"].to_numpy() / survey.radius)
+        turn = about_z(survey.bend.turns(stones["cy"].to_numpy()))
         stones[normal] = rotate(stones[normal].to_numpy(), turn)
     return scene
 
