@@ -44,7 +44,12 @@ fn summary(photos: &E57Photos, out: &Path) -> String {
     }
     if photos.panoramas > 0 {
         let panoramas = counted(photos.panoramas, "panorama");
-        let _ = writeln!(text, "{} of them cut from {panoramas}", 4 * photos.panoramas);
+        let _ = writeln!(
+            text,
+            "{} of them cut from {panoramas}; some programs turn panoramas against the pose that they write: \
+             look at the pictures of stonewise check before a run",
+            4 * photos.panoramas
+        );
     }
     for (reason, count) in &photos.left_out {
         let _ = writeln!(text, "left out: {} {reason}", counted(count, "image"));
@@ -58,7 +63,12 @@ fn summary(photos: &E57Photos, out: &Path) -> String {
     }
     text.push_str("for the epoch of these scans in a project file in this folder:\n");
     for (key, name) in [("images", E57_IMAGES_DIR), ("cameras", E57_CAMERAS_DIR)] {
-        let path = out.join(name).display().to_string().replace('\\', "/");
+        let path = out.join(name).display().to_string();
+        let path = if cfg!(windows) {
+            path.replace('\\', "/")
+        } else {
+            path
+        };
         let _ = writeln!(text, "{key} = {}", toml::Value::String(path));
     }
     text

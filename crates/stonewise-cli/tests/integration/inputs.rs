@@ -215,7 +215,7 @@ fn photos_in_e57_files_become_images_and_cameras_of_a_project() {
     let (code, _, log) = photos(&testdata("clouds/two_scans.e57"));
     assert_eq!(code, Some(1), "{log}");
     assert!(
-        log.contains("no images in the file") && log.contains("two_scans.e57"),
+        log.contains("no images inside") && log.contains("two_scans.e57"),
         "{log}"
     );
     assert!(!out.exists());

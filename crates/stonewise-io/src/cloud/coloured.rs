@@ -25,7 +25,7 @@ impl ColouredPoints {
     /// Adds a point inside the current part, with its sRGB colour and one number for each dimension.
     ///
     /// # Errors
-    /// The number of numbers is wrong.
+    /// The number of numbers is wrong, or the point lies in a node that no part from this one on reaches into.
     pub fn push(
         &mut self,
         position: Point3<f64>,
@@ -43,7 +43,7 @@ impl ColouredPoints {
             source: 0,
             gps_time: 0.0,
         };
-        let records = self.writer.records(record.rounded(&self.transforms));
+        let records = self.writer.records(record.rounded(&self.transforms))?;
         record.append(&self.transforms, records);
         records.extend(numbers.iter().flat_map(|v| v.to_le_bytes()));
         Ok(())
@@ -218,6 +218,42 @@ mod tests {
         })
         .unwrap();
         assert_eq!(read, places.len());
+    }
+
+    #[test]
+    fn one_point_and_none_make_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.copc.laz");
+        for count in [1, 0] {
+            let bounds = vec![Bounds::of([at(0, 0)]).unwrap()];
+            write_coloured_copc::<CloudError>(&path, bounds, 1, &[], None, |_, out| {
+                (0..count).try_for_each(|_| out.push(at(0, 0), [1; 3], &[]))
+            })
+            .unwrap();
+            let mut reader = CopcReader::from_path(&path).unwrap();
+            assert!(reader.hierarchy_entry(&VoxelKey::ROOT).is_some());
+            assert_eq!(
+                reader
+                    .query(LodSelection::All, BoundsSelection::All)
+                    .unwrap()
+                    .len(),
+                count
+            );
+        }
+    }
+
+    #[test]
+    fn points_of_a_part_before_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.copc.laz");
+        let part = |from, to| Bounds::of([at(from, from), at(to, to)]).unwrap();
+        let parts = vec![part(0, 10), part(500, 510)];
+        let refused = write_coloured_copc::<CloudError>(&path, parts, 1_000_000, &[], None, |_, out| {
+            (0..100).try_for_each(|_| out.push(at(0, 0), [0; 3], &[]))
+        });
+        let refused = refused.unwrap_err().to_string();
+        assert!(refused.contains("outside the box of their part"), "{refused}");
+        assert!(!path.exists());
     }
 
     #[test]

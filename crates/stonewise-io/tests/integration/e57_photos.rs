@@ -386,7 +386,7 @@ fn files_without_photos_say_so() {
     let scans = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/clouds/two_scans.e57");
     let message = unpack(&[scans], &out).unwrap_err();
     assert!(
-        message.starts_with("no images in the file: ") && message.ends_with("two_scans.e57"),
+        message.starts_with("no images inside: ") && message.ends_with("two_scans.e57"),
         "{message}"
     );
     let path = e57(

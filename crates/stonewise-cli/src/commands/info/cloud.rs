@@ -48,7 +48,11 @@ fn said_of(images: &E57ImageCounts, path: &Path) -> String {
         .collect();
     let mut text = String::new();
     if !kinds.is_empty() {
-        let (kinds, path) = (kinds.join(" and "), path.display());
+        let (kinds, path) = (kinds.join(" and "), path.display().to_string());
+        let path = match path.contains(char::is_whitespace) {
+            true => format!("\"{path}\""),
+            false => path,
+        };
         let _ = writeln!(
             text,
             "  {kinds} inside; to unpack: stonewise photos {path} --out DIR"

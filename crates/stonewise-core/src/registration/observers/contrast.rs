@@ -71,8 +71,8 @@ impl Params for ContrastParams {
 const NOISE_SAMPLE: usize = 32;
 /// Rounds in which the sources' common differences are found and removed before the stones are compared.
 const ALIGNMENTS: usize = 3;
-/// Share of the face, seen along its normal, that another source must show as well. A source that shows another side of
-/// a stone at a corner shows the edge of this face alone.
+/// Share of the face, seen along its normal, that two sources must both show. A source that shows another side of a
+/// stone at a corner shows the edge of this face alone.
 const LEAST_OVERLAP: f64 = 0.25;
 /// Cells by which this share is counted, in distances of neighbouring points.
 const OVERLAP_SPACINGS: f64 = 2.0;
@@ -128,45 +128,48 @@ struct Comparison {
 impl Comparison {
     /// `None` where fewer than two sources show enough.
     fn new(sources: &[Source], stone: &SeenStone, epoch: usize, params: &ContrastParams) -> Option<Self> {
-        let mut seen: Vec<&SourcePoints> = stone
+        let mut seen: Vec<(&SourcePoints, Cloud)> = stone
             .sights
             .iter()
             .filter(|s| sources[s.source].epoch == epoch && s.points.len() >= params.min_points)
+            .map(|s| (s, thinned(&s.points, params.max_points)))
             .collect();
-        seen.sort_by_key(|s| (std::cmp::Reverse(s.points.len()), s.source));
-        let reference = *seen.first()?;
-        seen.retain(|s| overlap([&reference.points, &s.points], &stone.normal) >= LEAST_OVERLAP);
-        let (_, others) = seen.split_first().filter(|(_, others)| !others.is_empty())?;
+        seen.sort_by_key(|(s, _)| (std::cmp::Reverse(s.points.len()), s.source));
+        let shown = face_cells(seen.iter().map(|(_, cloud)| cloud), &stone.normal);
+        let widest = shown.iter().max_by_key(|cells| cells.len())?;
+        let mut is_of_face = shown.iter().map(|cells| overlap(cells, widest) >= LEAST_OVERLAP);
+        seen.retain(|_| is_of_face.next().unwrap_or(false));
+        let (reference, others) = seen.split_first().filter(|(_, others)| !others.is_empty())?;
         let frame = FaceFrame::from_normal(&stone.normal).face_from_world();
 
-        let pair = |other: &&SourcePoints| {
+        let pair = |(_, other): &(&SourcePoints, Cloud)| {
             let pair = PairPoints {
                 first: StoneId(1),
                 second: StoneId(1),
                 centroid: stone.centroid,
                 centroid_second: stone.centroid,
                 normal: stone.normal,
-                points_first: thinned(&reference.points, params.max_points),
-                points_second: thinned(&other.points, params.max_points),
+                points_first: reference.1.clone(),
+                points_second: other.clone(),
                 nearby_second: Cloud::new(stone.centroid, Vec::new()),
                 window: None,
             };
             LocalPair::new(&pair, &frame, NoiseFactors::USUAL)
         };
 
-        let sight = |s: &&SourcePoints| {
+        let sight = |(s, cloud): &(&SourcePoints, Cloud)| {
             let sight = Sight {
                 source: s.source,
                 time_s: s.time_s,
                 place: stone.centroid,
                 target: Target::Stone { normal: stone.normal },
             };
-            (sight, s.points.len().min(params.max_points) as u64)
+            (sight, cloud.len() as u64)
         };
 
         Some(Self {
             pairs: others.iter().map(pair).collect(),
-            spacing_m: face_spacing(&thinned(&reference.points, params.max_points), &stone.normal),
+            spacing_m: face_spacing(&reference.1, &stone.normal),
             sights: seen.iter().map(sight).collect(),
             face_from_world: frame,
         })
@@ -316,24 +319,28 @@ fn common_noise(
     estimate_noise(&sample, start, layout)
 }
 
-/// Share of the face with points of the first cloud where the second has points, too, both seen along the normal.
-fn overlap(clouds: [&Cloud; 2], normal: &Vector3<f64>) -> f64 {
+/// The cells of the face with points of each cloud, seen along the normal.
+fn face_cells<'a>(
+    clouds: impl Iterator<Item = &'a Cloud> + Clone,
+    normal: &Vector3<f64>,
+) -> Vec<BTreeSet<[i64; 2]>> {
     let spacing_m = clouds
-        .map(|cloud| face_spacing(cloud, normal))
-        .into_iter()
+        .clone()
+        .map(|c| face_spacing(c, normal))
         .fold(0.0, f64::max);
     let frame = FaceFrame::from_normal(normal);
-    let [first, second] = clouds.map(|cloud| {
-        let cell = |p: Point3<f64>| {
-            let at =
-                |axis: &Vector3<f64>| (p.coords.dot(axis) / (OVERLAP_SPACINGS * spacing_m)).floor() as i64;
-            (at(&frame.along), at(&frame.up))
-        };
-        (0..cloud.len())
-            .map(|i| cell(cloud.world(i)))
-            .collect::<BTreeSet<_>>()
-    });
-    first.intersection(&second).count() as f64 / first.len().max(1) as f64
+    let cell = |p: Point3<f64>| {
+        let at = |axis: &Vector3<f64>| (p.coords.dot(axis) / (OVERLAP_SPACINGS * spacing_m)).floor() as i64;
+        [at(&frame.along), at(&frame.up)]
+    };
+    let cells = |cloud: &Cloud| (0..cloud.len()).map(|i| cell(cloud.world(i))).collect();
+    clouds.map(cells).collect()
+}
+
+/// Share of the larger set that both have.
+fn overlap(one: &BTreeSet<[i64; 2]>, other: &BTreeSet<[i64; 2]>) -> f64 {
+    let larger = one.len().max(other.len()).max(1);
+    one.intersection(other).count() as f64 / larger as f64
 }
 
 /// Evenly spaced points, so that no more than `most` remain.

@@ -588,10 +588,14 @@ fn with_others(
     let mut stones = wall(&ERRORS, 0.001, 3);
     for (k, stone) in stones.iter_mut().enumerate().filter(|(k, _)| is_other(*k)) {
         for sight in &mut stone.sights {
-            if sight.source % 2 == 1 {
-                let points = (0..sight.points.len()).map(|i| other(k, sight.points.world(i)));
-                sight.points = Cloud::from_world(stone.centroid, points.collect::<Vec<_>>());
-            }
+            let moved = |i: usize| match sight.source % 2 {
+                1 => other(k, sight.points.world(i)),
+                _ => sight.points.world(i),
+            };
+            // The source that shows something else shows more of it on every second stone.
+            let count = sight.points.len() - usize::from(k % 2 == sight.source % 2);
+            let points: Vec<_> = (0..count).map(moved).collect();
+            sight.points = Cloud::from_world(stone.centroid, points);
         }
     }
     let sources = sources(2);

@@ -93,6 +93,9 @@ impl E57Images {
                 if !panorama.is_full_circle() {
                     return Err(LeftOut::NotTheCircle);
                 }
+                if panorama.camera().width == 0 {
+                    return Err(LeftOut::WrongLens);
+                }
                 (Taken::Panorama(panorama), size, &image.blob, &image.mask)
             }
         };

@@ -2,7 +2,7 @@
 
 use super::super::camera_file::MAX_PIXELS;
 use super::super::pose::camera_at;
-use super::super::{CameraError, write_colmap};
+use super::super::{CameraError, read_cameras, write_colmap};
 use super::images::{E57Images, Placed, Taken};
 use super::left_out::LeftOut;
 use super::names::{FileNames, safe_stem};
@@ -99,7 +99,8 @@ pub fn require_e57_photos(paths: &[PathBuf]) -> Result<E57ImageCounts, CameraErr
 ///
 /// Pinhole images are written as they are in the file. Panoramas in spherical projection are cut into four photos
 /// around the horizon, of 90 degrees in both directions, with a quarter of the panorama's width. Other images are left
-/// out. The cameras come last, so that a camera file has all of its photos; one of an earlier call is removed first.
+/// out. The cameras come last, so that a camera file has all of its photos; those of an earlier call are removed first,
+/// with their photos.
 ///
 /// Cost: one image at a time is in memory.
 ///
@@ -113,7 +114,7 @@ pub fn unpack_e57_photos<E: From<CameraError> + From<Interrupted>>(
 ) -> Result<E57Photos, E> {
     let counts = require_e57_photos(paths)?;
     let (folder, cameras) = (out.join(E57_IMAGES_DIR), out.join(E57_CAMERAS_DIR));
-    remove_model(&cameras)?;
+    remove_earlier(&cameras, &folder)?;
     fs::create_dir_all(&folder).map_err(|source| CameraError::Write {
         path: folder.clone(),
         source,
@@ -236,22 +237,28 @@ impl Unpacker {
     }
 }
 
-/// Removes the list of photos of an earlier call, without which its cameras are no model.
-fn remove_model(folder: &Path) -> Result<(), CameraError> {
-    let path = folder.join("images.txt");
-    match fs::remove_file(&path) {
-        Err(source) if source.kind() != ErrorKind::NotFound => Err(CameraError::Write { path, source }),
-        _ => Ok(()),
+/// Removes the list of photos of an earlier call, without which its cameras are no model, and the photos that it names.
+fn remove_earlier(cameras: &Path, photos: &Path) -> Result<(), CameraError> {
+    let earlier = read_cameras(cameras).map_or(Vec::new(), |file| file.views);
+    let names = earlier.into_iter().map(|view| photos.join(view.name));
+    for path in std::iter::once(cameras.join("images.txt")).chain(names) {
+        match fs::remove_file(&path) {
+            Err(source) if source.kind() != ErrorKind::NotFound => {
+                return Err(CameraError::Write { path, source });
+            }
+            _ => {}
+        }
     }
+    Ok(())
 }
 
 fn no_photos(paths: &[PathBuf], left_out: &BTreeMap<LeftOut, usize>) -> CameraError {
     let files: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     let reasons: Vec<String> = left_out.iter().map(|(why, n)| format!("{n} {why}")).collect();
     let problem = match reasons.as_slice() {
-        [] => "no images in the file: export the scans with their photos".to_owned(),
+        [] => "no images inside: export the scans with their photos".to_owned(),
         reasons => format!(
-            "none of the images in the file is a photo with a camera and a pose ({}): export the scans with such photos",
+            "none of the images inside is a photo with a camera and a pose ({}): export the scans with such photos",
             reasons.join(", ")
         ),
     };

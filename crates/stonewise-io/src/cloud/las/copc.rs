@@ -1,6 +1,7 @@
 //! Writing COPC 1.0: a LAZ file whose chunks are the nodes of an octree, from coarse to fine.
 
-use std::collections::BTreeMap;
+use std::collections::btree_map::Entry as Slot;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, OpenOptions};
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -26,11 +27,13 @@ const EXTENDED_AT: u64 = 235;
 const INFO_AT: u64 = 375 + 54;
 /// Header of an extended record.
 const EXTENDED_HEADER: u64 = 60;
-/// About as many points lie in a node; levels are added until they do.
+/// At most about as many points lie in a node of the finest level.
 const NODE_POINTS: f64 = 50_000.0;
 const MAX_LEVEL: i32 = 16;
-/// How far points may lie outside the box of their part by rounding, metres.
-const MARGIN_M: f64 = 1e-3;
+/// How far points may lie outside the box of their part at least, by rounding, metres.
+const LEAST_MARGIN_M: f64 = 1e-3;
+/// Smallest side of the cube, metres: that of a single point.
+const LEAST_SIDE_M: f64 = 1e-3;
 
 /// Level, and place among the cells of that level.
 type NodeKey = (i32, [i32; 3]);
@@ -42,16 +45,56 @@ struct OpenNode {
     last_part: usize,
 }
 
+/// The cube of the octree.
+struct Cube {
+    lower: Point3<f64>,
+    side_m: f64,
+}
+
+impl Cube {
+    fn around(bounds: &Bounds) -> Self {
+        let side_m = (bounds.max - bounds.min).amax().max(LEAST_SIDE_M);
+        Self {
+            lower: bounds.centre() - Vector3::repeat(0.5 * side_m),
+            side_m,
+        }
+    }
+
+    fn cell_m(&self, level: i32) -> f64 {
+        self.side_m / f64::from(1 << level)
+    }
+
+    /// The node of a level that holds a place.
+    fn node(&self, level: i32, at: Point3<f64>) -> NodeKey {
+        let place = |axis: usize| {
+            let cell = (at[axis] - self.lower[axis]) / self.cell_m(level);
+            (cell as i32).clamp(0, (1 << level) - 1)
+        };
+        (level, [place(0), place(1), place(2)])
+    }
+
+    /// The box of a node, and as much around it.
+    fn bounds(&self, (level, place): NodeKey, margin_m: f64) -> Bounds {
+        let corner =
+            |end: i32| self.lower + Vector3::from(place.map(|i| f64::from(i + end))) * self.cell_m(level);
+        Bounds {
+            min: corner(0) - Vector3::repeat(margin_m),
+            max: corner(1) + Vector3::repeat(margin_m),
+        }
+    }
+}
+
 /// A COPC file that is being written.
 ///
 /// Every point is drawn to a level: four times as many to each as to the one before, as many as the cells that a
 /// surface crosses. Memory holds the nodes that parts to come reach into.
 pub struct CopcWriter {
     file: LazWriter,
-    lower: Point3<f64>,
-    side_m: f64,
+    cube: Cube,
     finest: i32,
     parts: Vec<Bounds>,
+    /// How far points may lie outside the box of their part, metres.
+    margin_m: f64,
     part: usize,
     drawn: u64,
     open: BTreeMap<NodeKey, OpenNode>,
@@ -69,14 +112,15 @@ impl CopcWriter {
         parts: Vec<Bounds>,
         points: u64,
     ) -> Result<Self, CloudError> {
-        let side_m = (whole.max - whole.min).amax().max(1e-3);
+        let cube = Cube::around(whole);
+        let margin_m = builder.transforms.x.scale.max(LEAST_MARGIN_M);
         builder.vlrs.insert(0, record(INFO, vec![0; INFO_BYTES]));
         Ok(Self {
             file: LazWriter::with_variable_chunks(partial, name, builder)?,
-            lower: whole.centre() - Vector3::repeat(0.5 * side_m),
-            side_m,
-            finest: finest_level(points),
+            finest: finest_level(points, &parts, &cube),
+            cube,
             parts,
+            margin_m,
             part: 0,
             drawn: 0,
             open: BTreeMap::new(),
@@ -90,35 +134,24 @@ impl CopcWriter {
     }
 
     /// The records of the node to which a point of the current part belongs; its own record goes to their end.
-    pub fn records(&mut self, position: Point3<f64>) -> &mut Vec<u8> {
-        let key = self.key(drawn_level(self.drawn, self.finest), position);
+    pub fn records(&mut self, position: Point3<f64>) -> Result<&mut Vec<u8>, CloudError> {
+        let key = self.cube.node(drawn_level(self.drawn, self.finest), position);
         self.drawn += 1;
-        let (parts, part, bounds) = (&self.parts, self.part, self.bounds(key));
-        let node = self.open.entry(key).or_insert_with(|| OpenNode {
-            records: Vec::new(),
-            last_part: { (part..parts.len()).rev() }
-                .find(|&p| parts[p].intersects(&bounds))
-                .unwrap_or(part),
-        });
-        &mut node.records
-    }
-
-    fn key(&self, level: i32, position: Point3<f64>) -> NodeKey {
-        let cells = 1 << level;
-        let place = |axis: usize| {
-            let share = (position[axis] - self.lower[axis]) / self.side_m;
-            ((share * f64::from(cells)) as i32).clamp(0, cells - 1)
-        };
-        (level, [place(0), place(1), place(2)])
-    }
-
-    /// A box around the node and what rounding brings into it.
-    fn bounds(&self, (level, place): NodeKey) -> Bounds {
-        let side_m = self.side_m / f64::from(1 << level);
-        let corner = |end: i32| self.lower + Vector3::from(place.map(|i| f64::from(i + end) * side_m));
-        Bounds {
-            min: corner(0) - Vector3::repeat(MARGIN_M),
-            max: corner(1) + Vector3::repeat(MARGIN_M),
+        match self.open.entry(key) {
+            Slot::Occupied(node) => Ok(&mut node.into_mut().records),
+            Slot::Vacant(_) if self.written.contains(&key) => {
+                let reason = "points lie outside the box of their part";
+                Err(CloudError::unwritable(self.file.name(), reason))
+            }
+            Slot::Vacant(slot) => {
+                let bounds = self.cube.bounds(key, self.margin_m);
+                let later = self.parts.iter().rposition(|part| part.intersects(&bounds));
+                let node = OpenNode {
+                    records: Vec::new(),
+                    last_part: later.unwrap_or(0).max(self.part),
+                };
+                Ok(&mut slot.insert(node).records)
+            }
         }
     }
 
@@ -141,8 +174,7 @@ impl CopcWriter {
         let open = OpenOptions::new().read(true).write(true).open(partial);
         let mut file = open.map_err(|e| CloudError::write(&name, e))?;
         let octree = Octree {
-            centre: self.lower + Vector3::repeat(0.5 * self.side_m),
-            half_m: 0.5 * self.side_m,
+            cube: self.cube,
             finest: self.finest,
             chunks: self.written,
         };
@@ -154,8 +186,7 @@ impl CopcWriter {
 
 /// The nodes of a file whose points are written.
 struct Octree {
-    centre: Point3<f64>,
-    half_m: f64,
+    cube: Cube,
     finest: i32,
     /// The node of each chunk, in the order of the file.
     chunks: Vec<NodeKey>,
@@ -187,17 +218,26 @@ impl Octree {
         record(HIERARCHY, data).into_raw(true)?.write_to(&mut *file)?;
 
         file.seek(SeekFrom::Start(INFO_AT))?;
-        let centre = [self.centre.x, self.centre.y, self.centre.z];
-        for value in centre.into_iter().chain([self.half_m, self.spacing_m(&nodes)]) {
+        let half_m = 0.5 * self.cube.side_m;
+        let centre = self.cube.lower + Vector3::repeat(half_m);
+        for value in [centre.x, centre.y, centre.z, half_m, self.spacing_m(&nodes)] {
             file.write_all(&value.to_le_bytes())?;
         }
         for value in [start + EXTENDED_HEADER, size] {
             file.write_all(&value.to_le_bytes())?;
         }
 
+        // Other extended records lie before this one.
+        let mut extended = [0; 12];
         file.seek(SeekFrom::Start(EXTENDED_AT))?;
-        file.write_all(&start.to_le_bytes())?;
-        file.write_all(&1_u32.to_le_bytes())?;
+        file.read_exact(&mut extended)?;
+        let (first, count) = extended.split_at_mut(8);
+        if count.iter().all(|byte| *byte == 0) {
+            first.copy_from_slice(&start.to_le_bytes());
+        }
+        count[0] += 1;
+        file.seek(SeekFrom::Start(EXTENDED_AT))?;
+        file.write_all(&extended)?;
         Ok(())
     }
 
@@ -210,7 +250,7 @@ impl Octree {
         file.seek(SeekFrom::Start(points_at))?;
         let sizes = ChunkTable::read_from(BufReader::new(&mut *file), laszip)?;
 
-        let mut nodes = BTreeMap::new();
+        let mut nodes = BTreeMap::from([((0, [0; 3]), Entry::default())]);
         let mut offset = points_at + ChunkTable::OFFSET_SIZE as u64;
         for (&(level, place), size) in self.chunks.iter().zip(&sizes) {
             let entry = Entry {
@@ -229,7 +269,7 @@ impl Octree {
 
     /// Distance between the points of the coarsest node, if the cells of the finest level are about filled by a surface.
     fn spacing_m(&self, nodes: &BTreeMap<NodeKey, Entry>) -> f64 {
-        let cell_m = 2.0 * self.half_m / f64::from(1 << self.finest);
+        let cell_m = self.cube.cell_m(self.finest);
         let finest = nodes.keys().filter(|(level, _)| *level == self.finest).count();
         let coarsest = nodes.get(&(0, [0; 3])).map_or(0, |entry| entry.points);
         cell_m * (finest.max(1) as f64 / f64::from(coarsest.max(1))).sqrt()
@@ -245,11 +285,25 @@ fn record(record_id: u16, data: Vec<u8>) -> Vlr {
     }
 }
 
-/// The finest level of a cloud with so many points.
-fn finest_level(points: u64) -> i32 {
-    let coarsest = |level: i32| 3.0 * points as f64 / 4_f64.powi(level + 1);
+/// The first level whose nodes hold few points, of a surface in these parts. It crosses as many cells as parts do; of
+/// cells smaller than a part, four times as many as of the level before.
+fn finest_level(points: u64, parts: &[Bounds], cube: &Cube) -> i32 {
+    let part_m = parts
+        .iter()
+        .map(|part| (part.max - part.min).amax())
+        .fold(0.0, f64::max);
+    let mut cells = 1.0;
     (0..MAX_LEVEL)
-        .find(|&l| coarsest(l) <= NODE_POINTS)
+        .find(|&level| {
+            cells = if cube.cell_m(level) < part_m {
+                4.0 * cells
+            } else {
+                let nodes: BTreeSet<NodeKey> =
+                    parts.iter().map(|part| cube.node(level, part.centre())).collect();
+                nodes.len() as f64
+            };
+            0.75 * points as f64 / cells <= NODE_POINTS
+        })
         .unwrap_or(MAX_LEVEL)
 }
 
@@ -271,11 +325,32 @@ mod tests {
     use super::*;
 
     #[test]
+    fn nodes_of_a_long_wall_hold_as_many_points_as_those_of_a_high_one() {
+        // Parts of 4 x 4 m.
+        let parts = |along: u32, up: u32| -> Vec<Bounds> {
+            let corner = |i: u32, j: u32| Point3::new(0.0, 4.0 * f64::from(i), 4.0 * f64::from(j));
+            let part = |(i, j)| Bounds::of([corner(i, j), corner(i + 1, j + 1)]).unwrap();
+            (0..along)
+                .flat_map(|i| (0..up).map(move |j| (i, j)))
+                .map(part)
+                .collect()
+        };
+        for (along, up) in [(1, 1), (8, 8), (50, 1), (50, 7)] {
+            let parts = parts(along, up);
+            let whole = parts.iter().copied().reduce(|a, b| a.union(&b)).unwrap();
+            let cube = Cube::around(&whole);
+            let points = 200_000 * u64::from(along * up);
+            let cell_m = cube.cell_m(finest_level(points, &parts, &cube));
+            let of_node = 0.75 * 200_000.0 * (cell_m / 4.0).powi(2);
+            assert!(
+                (10_000.0..80_000.0).contains(&of_node),
+                "{along} x {up}: {of_node}"
+            );
+        }
+    }
+
+    #[test]
     fn each_level_gets_four_times_as_many_points_as_the_one_before() {
-        assert_eq!(
-            (finest_level(0), finest_level(66_000), finest_level(270_000)),
-            (0, 0, 2)
-        );
         let mut counts = [0; 4];
         (0..850_000).for_each(|i| counts[drawn_level(i, 3) as usize] += 1);
         for (count, expected) in counts.into_iter().zip([10_000, 40_000, 160_000, 640_000]) {

@@ -6,6 +6,9 @@ use stonewise_simulate::{BeamParams, PhotoParams, UavParams};
 
 /// Most strips, and most photos along the wall and above each other.
 const MOST: u32 = 1000;
+/// Most photos of a survey, and most points of a flight.
+const MOST_PHOTOS: u32 = 2000;
+const MOST_POINTS: f64 = 1e9;
 /// Smallest and largest side of a photo, pixels.
 const SIDE_PX: [u32; 2] = [16, 20_000];
 
@@ -46,13 +49,21 @@ impl Default for PlannedDrone {
 }
 
 impl PlannedDrone {
-    pub(super) fn check(&self) -> Result<(), String> {
+    pub(super) fn check(&self, [width_m, height_m]: [f64; 2]) -> Result<(), String> {
         count("drone.strips", self.strips, 1..=MOST)?;
         positive("drone.distance_m", self.distance_m)?;
         positive("drone.spacing_m", self.spacing_m)?;
         not_negative("drone.range_noise_m", self.range_noise_m)?;
         not_negative("drone.datum_m", self.datum_m.unwrap_or(0.0))?;
-        not_negative("drone.drift_m", self.drift_m)
+        not_negative("drone.drift_m", self.drift_m)?;
+        let points = width_m * height_m / self.spacing_m.powi(2);
+        match points > MOST_POINTS {
+            true => Err(format!(
+                "drone.spacing_m = {}: the wall would have {points:.1e} points; at most {MOST_POINTS:.0e} are simulated",
+                self.spacing_m
+            )),
+            false => Ok(()),
+        }
     }
 
     /// The flight as the simulator flies it.
@@ -123,14 +134,23 @@ impl PlannedPhotos {
         }
     }
 
-    pub(super) fn check(&self) -> Result<(), String> {
+    pub(super) fn check(&self, size_m: [f64; 2]) -> Result<(), String> {
         positive("photos.distance_m", self.distance_m)?;
         positive("photos.focal_px", self.focal_px)?;
         count("photos.columns", self.columns.unwrap_or(1), 1..=MOST)?;
         count("photos.rows", self.rows.unwrap_or(1), 1..=MOST)?;
         count("photos.width_px", self.width_px, SIDE_PX[0]..=SIDE_PX[1])?;
         count("photos.height_px", self.height_px, SIDE_PX[0]..=SIDE_PX[1])?;
-        not_negative("photos.pose_error_px", self.pose_error_px.unwrap_or(0.0))
+        not_negative("photos.pose_error_px", self.pose_error_px.unwrap_or(0.0))?;
+        let PhotoParams { columns, rows, .. } = self.params(size_m);
+        match columns * rows > MOST_PHOTOS {
+            true => Err(format!(
+                "photos: {columns} x {rows} of them show the wall from photos.distance_m = {} with photos.focal_px = {}; \
+                 at most {MOST_PHOTOS} are simulated",
+                self.distance_m, self.focal_px
+            )),
+            false => Ok(()),
+        }
     }
 
     /// The photos as the simulator takes them of a wall of this width and height, metres, rendered.

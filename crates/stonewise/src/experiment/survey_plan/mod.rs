@@ -120,6 +120,7 @@ fn survey(
             Some(_) => params.photos.columns * params.photos.rows,
             None => 0,
         },
+        targets: plan.targets.is_some(),
         added: added.cloned(),
         stones: [squares.stones(), found.len()],
         datum: measured.datum.state,

@@ -4,7 +4,6 @@ use super::planned::PlannedSurvey;
 use super::squares::Squares;
 use crate::experiment::predicted::in_table;
 use crate::figure::{Axis, GREY, Item, Page, Plot, Ramp, table};
-use crate::results::records::DatumState;
 use stonewise_core::registration::ZONE_EXTENTS_M;
 
 /// Width of a map, pixels.
@@ -73,7 +72,7 @@ fn sources(survey: &PlannedSurvey) -> String {
     let stations = (!survey.stations.is_empty()).then(|| format!("Stations {}", survey.stations.join(", ")));
     let drone = survey.drone.then(|| "drone".to_owned());
     let photos = (survey.photos > 0).then(|| format!("{} photos", survey.photos));
-    let targets = (survey.datum == DatumState::Stated).then(|| "targets".to_owned());
+    let targets = survey.targets.then(|| "targets".to_owned());
     let all: Vec<String> = [stations, drone, photos, targets].into_iter().flatten().collect();
     all.join("; ")
 }

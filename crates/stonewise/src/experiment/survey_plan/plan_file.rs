@@ -180,8 +180,11 @@ impl SurveyPlan {
         positive("square_m", self.square_m)?;
         not_negative("registration.shift_m", self.registration.shift_m)?;
         not_negative("registration.rotation_rad", self.registration.rotation_rad)?;
-        self.drone.as_ref().map_or(Ok(()), PlannedDrone::check)?;
-        self.photos.as_ref().map_or(Ok(()), PlannedPhotos::check)?;
+        let size_m = [self.wall.width_m, self.wall.height_m];
+        self.drone.as_ref().map_or(Ok(()), |drone| drone.check(size_m))?;
+        self.photos
+            .as_ref()
+            .map_or(Ok(()), |photos| photos.check(size_m))?;
         not_negative(
             "targets.error_m",
             self.targets.as_ref().map_or(0.0, |t| t.error_m),
@@ -355,6 +358,8 @@ mod tests {
         added("[drone]\ndatum_m = -0.001", "drone.datum_m");
         added("[photos]\ncolumns = 0", "photos.columns = 0");
         added("[photos]\nwidth_px = 8", "photos.width_px = 8");
+        added("[photos]\nfocal_px = 240000.0", "photos.focal_px = 240000");
+        added("[drone]\nspacing_m = 1e-5", "drone.spacing_m = 0.00001");
         added("[photos]\npose_error_px = nan", "photos.pose_error_px = NaN");
         added("[targets]\nerror_m = -1.0", "targets.error_m = -1");
         added("[targets]", "error_m");

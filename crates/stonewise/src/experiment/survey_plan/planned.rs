@@ -13,6 +13,8 @@ pub struct PlannedSurvey {
     pub drone: bool,
     /// Number of photos that measure, in each epoch.
     pub photos: u32,
+    /// Whether stable targets give the frame.
+    pub targets: bool,
     /// What is added: the name of a station, `drone`, `photos` or `targets`; absent for the survey as it is planned.
     pub added: Option<String>,
     /// Stones of the wall above ground, and those of them that will be measured.
