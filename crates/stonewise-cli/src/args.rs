@@ -161,10 +161,10 @@ pub enum Command {
     /// Describe the content of a cloud, photos, a camera file, a mask file or a project.
     #[command(after_help = "Example:\n  stonewise info epoch1/cloud_tls.laz epoch1/cameras.xml")]
     Info(InfoArgs),
-    /// Unpack the photos that scanners store in E57 files, with their cameras, for the epoch of a project.
+    /// Unpack the photos that scanners store in E57 files, with their cameras, for use in a project.
     #[command(
         after_help = "Example:\n  stonewise photos epoch1/scan.e57 --out epoch1/photos/\n\n\
-        The summary goes to stdout, with the two lines for the project file. Panoramas are cut into photos. Exit code 3 if images are left out."
+        The summary goes to stdout, with the lines `images` and `cameras` for the project file. Panoramas are cut into photos. Exit code 3 if images are left out."
     )]
     Photos(PhotosArgs),
     /// Explain the code of a message: what was seen, what it means, what to do.
@@ -683,7 +683,7 @@ pub struct PhotosArgs {
     /// E57 files, whose photos share one folder and one camera file.
     #[arg(required = true, value_name = "SCAN")]
     pub scans: Vec<PathBuf>,
-    /// Folder of the photos (images) and their cameras (colmap); created if missing.
+    /// Folder for the photos (in images/) and their cameras (in colmap/); created if missing.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
 }

@@ -46,7 +46,7 @@ fn summary(photos: &E57Photos, out: &Path) -> String {
         let panoramas = counted(photos.panoramas, "panorama");
         let _ = writeln!(
             text,
-            "{} of them cut from {panoramas}; some programs turn panoramas against the pose that they write: \
+            "{} of them cut from {panoramas}; some programs write panoramas that are rotated relative to their pose: \
              look at the pictures of stonewise check before a run",
             4 * photos.panoramas
         );
@@ -56,12 +56,9 @@ fn summary(photos: &E57Photos, out: &Path) -> String {
     }
     if photos.masked > 0 {
         let masked = counted(photos.masked, "image");
-        let _ = writeln!(
-            text,
-            "{masked} with a mask of parts that show nothing, which is not applied"
-        );
+        let _ = writeln!(text, "{masked} with a mask, which is not applied");
     }
-    text.push_str("for the epoch of these scans in a project file in this folder:\n");
+    text.push_str("add to the epoch of these scans in a project file in this folder:\n");
     for (key, name) in [("images", E57_IMAGES_DIR), ("cameras", E57_CAMERAS_DIR)] {
         let path = out.join(name).display().to_string();
         let path = if cfg!(windows) {

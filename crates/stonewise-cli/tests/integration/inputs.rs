@@ -223,7 +223,7 @@ fn photos_in_e57_files_become_images_and_cameras_of_a_project() {
     e57_with_photos(&scan, 0);
     let (code, said, _) = info(std::slice::from_ref(&scan));
     let expected = format!(
-        "  1 photo inside; to unpack: stonewise photos {} --out DIR\n",
+        "  contains 1 photo; to unpack them: stonewise photos {} --out DIR\n",
         scan.display()
     );
     assert!(code == 0 && said.contains(&expected), "{said}");

@@ -481,7 +481,10 @@ fn images_that_claim_more_pixels_than_any_camera_has_are_refused() {
         image.set_transform(here.clone());
     };
     let images: [(Add<'_>, &str); 2] = [
-        (&photo, "the image has 60000 x 60000 pixels, more than any camera"),
+        (
+            &photo,
+            "the image has 60000 x 60000 pixels, more than any camera has",
+        ),
         (&panorama, "the image cannot be read"),
     ];
     for (image, expected) in images {

@@ -55,7 +55,7 @@ fn said_of(images: &E57ImageCounts, path: &Path) -> String {
         };
         let _ = writeln!(
             text,
-            "  {kinds} inside; to unpack: stonewise photos {path} --out DIR"
+            "  contains {kinds}; to unpack them: stonewise photos {path} --out DIR"
         );
     }
     for (reason, count) in &images.left_out {

@@ -506,7 +506,7 @@ impl<'a> Problem<'a> {
         misfits.into_iter().zip(&self.designs).map(weight).collect()
     }
 
-    /// The same where the variances are not known yet: misfits count against their median.
+    /// The same where the variances are not known yet: misfits are compared with their median.
     pub fn gross_weights(&self, mean: &DVector<f64>, components: &ObserverComponents) -> Vec<f64> {
         let misfits = self.misfits(mean, components);
         let usual = upper_median(&mut misfits.clone()).unwrap_or(1.0).max(1.0);

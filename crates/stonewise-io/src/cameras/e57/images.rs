@@ -1,4 +1,4 @@
-//! The images of an E57 file, and how each was taken.
+//! The images of an E57 file, and their camera models and poses.
 
 use super::super::pose::{FLIP, rotation};
 use super::super::{CameraError, malformed};
@@ -44,13 +44,13 @@ pub enum Taken {
 }
 
 impl E57Images {
-    /// Opens a file and reads what it says of its images.
+    /// Opens a file and reads the descriptions of its images.
     pub fn open(path: &Path) -> Result<Self, CameraError> {
         let file = File::open(path).map_err(|source| CameraError::Read {
             path: path.to_owned(),
             source,
         })?;
-        let reader = guarded(path, "its head", || E57Reader::new(BufReader::new(file)))?;
+        let reader = guarded(path, "its header", || E57Reader::new(BufReader::new(file)))?;
         Ok(Self {
             path: path.to_owned(),
             images: reader.images(),

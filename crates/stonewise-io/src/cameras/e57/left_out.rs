@@ -11,11 +11,11 @@ pub enum LeftOut {
     NoProjection,
     /// The file does not say where it was taken.
     NoPose,
-    /// Its pose is no rotation and place.
+    /// Its pose is not a valid rotation and position.
     WrongPose,
-    /// Its focal length or the size of its pixels cannot be.
+    /// Its focal length or the size of its pixels is impossible.
     WrongLens,
-    /// It is a panorama of less, or more, than the circle.
+    /// It is a panorama of less or more than the full circle.
     NotTheCircle,
     /// It has another size than the file says, so that its focal length in pixels is unknown.
     OtherSize,
@@ -25,13 +25,13 @@ impl fmt::Display for LeftOut {
     /// What follows "3 images".
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Cylindrical => "projected on a cylinder, which is not read",
+            Self::Cylindrical => "in cylindrical projection, which is not supported",
             Self::NoProjection => "without a camera model, as previews are",
             Self::NoPose => "without a pose",
-            Self::WrongPose => "with a pose that is no rotation and place",
+            Self::WrongPose => "with an impossible pose",
             Self::WrongLens => "with an impossible focal length or pixel size",
-            Self::NotTheCircle => "in spherical projection that do not show the full circle once",
-            Self::OtherSize => "of another size than the file says",
+            Self::NotTheCircle => "in spherical projection without exactly one full circle",
+            Self::OtherSize => "of another size than the file states",
         })
     }
 }

@@ -36,7 +36,7 @@ impl Panorama {
         (around / TAU - 1.0).abs() < CLOSED && up > 0.0 && up < PI * (1.0 + CLOSED)
     }
 
-    /// The camera of its photos, which see 90 degrees in both directions.
+    /// The camera of its photos, with a field of view of 90 degrees in both directions.
     pub fn camera(&self) -> Camera {
         let side = self.size[0] / 4;
         Camera::pinhole(side, side, f64::from(side) / 2.0)
@@ -57,7 +57,7 @@ impl Panorama {
         photo
     }
 
-    /// What is seen in a direction, between the four nearest pixels.
+    /// The colour in a direction, interpolated bilinearly.
     fn colour(&self, picture: &RgbImage, direction: &Vector3<f64>) -> [u8; 3] {
         let azimuth = direction.y.atan2(direction.x);
         let elevation = direction.z.atan2(direction.x.hypot(direction.y));

@@ -61,7 +61,7 @@ pub struct E57Photos {
     pub left_out: BTreeMap<LeftOut, usize>,
 }
 
-/// Counts the images of E57 files, from their heads alone.
+/// Counts the images of E57 files, from their headers alone.
 ///
 /// # Errors
 /// A file cannot be read or is no E57 file.
@@ -151,7 +151,7 @@ struct Unpacker {
 }
 
 impl Unpacker {
-    /// Unpacks an image, or says why it is left out.
+    /// Unpacks an image, or returns why it is left out.
     fn unpack(&mut self, images: &mut E57Images, index: usize) -> Result<Result<(), LeftOut>, CameraError> {
         let placed = match images.placed(index) {
             Ok(placed) => placed,
@@ -174,7 +174,7 @@ impl Unpacker {
         };
         if is_huge {
             let problem = format!(
-                "the image has {} x {} pixels, more than any camera",
+                "the image has {} x {} pixels, more than any camera has",
                 size[0], size[1]
             );
             return Err(images.malformed(index, problem));
@@ -258,7 +258,7 @@ fn no_photos(paths: &[PathBuf], left_out: &BTreeMap<LeftOut, usize>) -> CameraEr
     let problem = match reasons.as_slice() {
         [] => "no images inside: export the scans with their photos".to_owned(),
         reasons => format!(
-            "none of the images inside is a photo with a camera and a pose ({}): export the scans with such photos",
+            "none of the images is a photo with a camera model and a pose ({}): export the scans with such photos",
             reasons.join(", ")
         ),
     };

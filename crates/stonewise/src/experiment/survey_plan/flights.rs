@@ -1,4 +1,4 @@
-//! What flies in a planned survey: a lidar under a drone, and a camera.
+//! The lidar on a drone and the photos of a planned survey.
 
 use super::values::{count, not_negative, positive};
 use serde::{Deserialize, Serialize};
@@ -29,7 +29,7 @@ pub struct PlannedDrone {
     pub datum_m: Option<f64>,
     /// Error that drifts along a strip, per axis, standard deviation, metres.
     pub drift_m: f64,
-    /// Whether the flight is one of those things that the survey may get in addition.
+    /// Whether the flight is a candidate, which may be added to the survey.
     pub candidate: bool,
 }
 
@@ -103,7 +103,7 @@ pub struct PlannedPhotos {
     /// Error of a photo's pose, pixels on the wall: standard deviation of what its position and of what its attitude
     /// shift. Absent: 0.3 each, and the run assumes what it does where a project states nothing.
     pub pose_error_px: Option<f64>,
-    /// Whether measuring in photos is one of those things that the survey may get in addition.
+    /// Whether measuring in photos is a candidate, which may be added to the survey.
     pub candidate: bool,
 }
 
@@ -145,7 +145,7 @@ impl PlannedPhotos {
         let PhotoParams { columns, rows, .. } = self.params(size_m);
         match columns * rows > MOST_PHOTOS {
             true => Err(format!(
-                "photos: {columns} x {rows} of them show the wall from photos.distance_m = {} with photos.focal_px = {}; \
+                "photos: {columns} x {rows} photos show the wall from photos.distance_m = {} with photos.focal_px = {}; \
                  at most {MOST_PHOTOS} are simulated",
                 self.distance_m, self.focal_px
             )),

@@ -1,8 +1,8 @@
-//! What a survey will see that is only planned: a plain wall is simulated, surveyed twice as planned, and
+//! Predicts the accuracy of a planned survey: a plain wall is simulated, surveyed twice as planned, and
 //! measured as any survey is.
 //!
-//! The wall stands still, so that what the adjustment says of its accuracy is what a survey of such a wall will
-//! have. The same is done with each candidate in addition; all share the wall and the errors of what is planned.
+//! The wall stands still, so that the accuracy that the adjustment gives is that of a survey of such a
+//! wall. The same is done with each candidate in addition; all share the wall and the errors of what is planned.
 
 mod flights;
 mod page;
@@ -64,7 +64,7 @@ pub fn design_plan(plan: &SurveyPlan, seed: u64, out: &Path, progress: &dyn Prog
     let mut each = maps.iter().map(|(survey, _)| survey.clone());
     let planned = each
         .next()
-        .ok_or_else(|| Error::Survey("a plan without surveys".to_owned()))?;
+        .ok_or_else(|| Error::Survey("the plan has no survey".to_owned()))?;
     let design = PlanDesign {
         seed,
         planned,
@@ -107,8 +107,8 @@ fn survey(
         .collect();
     if found.is_empty() {
         return Err(Error::Survey(format!(
-            "{name}: no stone is measured; do stations and strips lie in front of the wall, with beams near \
-             enough to each other?"
+            "{name}: no stone is measured; are the stations and strips in front of the wall, and is the \
+             point spacing small enough?"
         )));
     }
 

@@ -233,7 +233,7 @@ impl SurveyPlan {
         let planned = self.with(None);
         match planned.stations.is_empty() && planned.drone.is_none() {
             true => Err(
-                "one of the [[stations]] or the [drone] must be no candidate: nothing scans the wall"
+                "nothing scans the wall: at least one of the [[stations]] or the [drone] must not be a candidate"
                     .to_owned(),
             ),
             false => Ok(()),
@@ -257,7 +257,7 @@ impl SurveyPlan {
         stations.chain(others).collect()
     }
 
-    /// The plan with what takes part alone: what is no candidate, then the one that is added.
+    /// The plan reduced to what takes part: everything that is not a candidate, and the added candidate.
     pub fn with(&self, added: Option<&str>) -> Self {
         let is_in = |name: &str, candidate: bool| !candidate || added == Some(name);
         let mut plan = self.clone();
@@ -349,7 +349,11 @@ mod tests {
             "step_rad of instrument \"far\"",
         );
         refused("candidate", "instrument = \"near\"\ncandidate", "\"near\"");
-        refused("along_m = 2.0", "along_m = 2.0\ncandidate = true", "no candidate");
+        refused(
+            "along_m = 2.0",
+            "along_m = 2.0\ncandidate = true",
+            "not be a candidate",
+        );
         refused("spot_m", "dot_m", "dot_m");
         refused("\"B\"", "\"drone\"", "rename the station");
         let added = |table: &str, named: &str| refused("[wall]", &format!("{table}\n[wall]"), named);

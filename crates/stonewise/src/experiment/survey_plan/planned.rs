@@ -9,7 +9,7 @@ use serde::Serialize;
 pub struct PlannedSurvey {
     /// Names of the stations.
     pub stations: Vec<String>,
-    /// Whether a lidar under a drone scans the wall.
+    /// Whether a lidar on a drone scans the wall.
     pub drone: bool,
     /// Number of photos that measure, in each epoch.
     pub photos: u32,
