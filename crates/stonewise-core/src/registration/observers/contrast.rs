@@ -12,11 +12,11 @@ use crate::registration::adjustment::observation::surface::{
 use crate::registration::adjustment::stone_vector::StoneVector;
 use crate::registration::points::{PairPoints, face_spacing};
 use crate::statistics::upper_median;
-use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Parameters of the comparison of an epoch's sources.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -74,8 +74,13 @@ const ALIGNMENTS: usize = 3;
 /// Share of the face, seen along its normal, that two sources must both show. A source that shows another side of a
 /// stone at a corner shows the edge of this face alone.
 const LEAST_OVERLAP: f64 = 0.25;
-/// Cells by which this share is counted, in distances of neighbouring points.
-const OVERLAP_SPACINGS: f64 = 2.0;
+/// Cells of a face, in distances of neighbouring points.
+const FACE_SPACINGS: f64 = 2.0;
+/// A cell that is as many times deeper than wide shows a flank of the stone, seen along the face.
+const STEEP: f64 = 2.0;
+/// Share of its points on a flank beyond which a stone is not compared: points there are close together in the face, and
+/// their depths differ by as much as the flank is deep. Ordinary stones have less than 0.02.
+const MOST_STEEP: f64 = 0.05;
 /// Standard deviation that stands for "not seen", metres: keeps a flat stone's covariance finite.
 const UNSEEN_M: f64 = 0.1;
 
@@ -135,9 +140,12 @@ impl Comparison {
             .map(|s| (s, thinned(&s.points, params.max_points)))
             .collect();
         seen.sort_by_key(|(s, _)| (std::cmp::Reverse(s.points.len()), s.source));
-        let shown = face_cells(seen.iter().map(|(_, cloud)| cloud), &stone.normal);
-        let widest = shown.iter().max_by_key(|cells| cells.len())?;
-        let mut is_of_face = shown.iter().map(|cells| overlap(cells, widest) >= LEAST_OVERLAP);
+        let shown = FaceCells::of_clouds(seen.iter().map(|(_, cloud)| cloud), &stone.normal);
+        let widest = shown.iter().max_by_key(|cells| cells.by_place.len())?;
+        if widest.steep_share() > MOST_STEEP {
+            return None;
+        }
+        let mut is_of_face = shown.iter().map(|cells| cells.overlap(widest) >= LEAST_OVERLAP);
         seen.retain(|_| is_of_face.next().unwrap_or(false));
         let (reference, others) = seen.split_first().filter(|(_, others)| !others.is_empty())?;
         let frame = FaceFrame::from_normal(&stone.normal).face_from_world();
@@ -319,28 +327,69 @@ fn common_noise(
     estimate_noise(&sample, start, layout)
 }
 
-/// The cells of the face with points of each cloud, seen along the normal.
-fn face_cells<'a>(
-    clouds: impl Iterator<Item = &'a Cloud> + Clone,
-    normal: &Vector3<f64>,
-) -> Vec<BTreeSet<[i64; 2]>> {
-    let spacing_m = clouds
-        .clone()
-        .map(|c| face_spacing(c, normal))
-        .fold(0.0, f64::max);
-    let frame = FaceFrame::from_normal(normal);
-    let cell = |p: Point3<f64>| {
-        let at = |axis: &Vector3<f64>| (p.coords.dot(axis) / (OVERLAP_SPACINGS * spacing_m)).floor() as i64;
-        [at(&frame.along), at(&frame.up)]
-    };
-    let cells = |cloud: &Cloud| (0..cloud.len()).map(|i| cell(cloud.world(i))).collect();
-    clouds.map(cells).collect()
+/// The cells of a face with points of a cloud, seen along the normal.
+struct FaceCells {
+    cell_m: f64,
+    by_place: BTreeMap<[i64; 2], CellDepths>,
 }
 
-/// Share of the larger set that both have.
-fn overlap(one: &BTreeSet<[i64; 2]>, other: &BTreeSet<[i64; 2]>) -> f64 {
-    let larger = one.len().max(other.len()).max(1);
-    one.intersection(other).count() as f64 / larger as f64
+/// The points of a cell.
+struct CellDepths {
+    points: usize,
+    /// Smallest and largest distance from the face, metres.
+    range_m: [f64; 2],
+}
+
+impl FaceCells {
+    /// The cells of each cloud, in one grid.
+    fn of_clouds<'a>(clouds: impl Iterator<Item = &'a Cloud> + Clone, normal: &Vector3<f64>) -> Vec<Self> {
+        let spacing_m = clouds
+            .clone()
+            .map(|c| face_spacing(c, normal))
+            .fold(0.0, f64::max);
+        let frame = FaceFrame::from_normal(normal);
+        let cell_m = FACE_SPACINGS * spacing_m;
+        let of_cloud = |cloud: &Cloud| {
+            let mut by_place = BTreeMap::new();
+            for i in 0..cloud.len() {
+                let at = cloud.world(i).coords;
+                let place = [frame.along, frame.up].map(|axis| (at.dot(&axis) / cell_m).floor() as i64);
+                let depth_m = at.dot(normal);
+                let none = CellDepths {
+                    points: 0,
+                    range_m: [f64::INFINITY, f64::NEG_INFINITY],
+                };
+                let cell = by_place.entry(place).or_insert(none);
+                cell.points += 1;
+                cell.range_m = [cell.range_m[0].min(depth_m), cell.range_m[1].max(depth_m)];
+            }
+            Self { cell_m, by_place }
+        };
+        clouds.map(of_cloud).collect()
+    }
+
+    /// Share of the larger of two faces that both show.
+    fn overlap(&self, other: &Self) -> f64 {
+        let larger = self.by_place.len().max(other.by_place.len()).max(1);
+        let shared = self
+            .by_place
+            .keys()
+            .filter(|place| other.by_place.contains_key(*place));
+        shared.count() as f64 / larger as f64
+    }
+
+    /// Share of the points in cells that are much deeper than wide.
+    fn steep_share(&self) -> f64 {
+        let is_steep = |c: &&CellDepths| c.range_m[1] - c.range_m[0] > STEEP * self.cell_m;
+        let of_all = self.by_place.values().map(|c| c.points).sum::<usize>();
+        let steep = self
+            .by_place
+            .values()
+            .filter(is_steep)
+            .map(|c| c.points)
+            .sum::<usize>();
+        steep as f64 / of_all.max(1) as f64
+    }
 }
 
 /// Evenly spaced points, so that no more than `most` remain.

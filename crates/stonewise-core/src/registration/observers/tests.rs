@@ -619,6 +619,27 @@ fn sources_that_show_two_sides_of_a_corner_are_not_compared_there() {
 }
 
 #[test]
+fn stones_of_which_all_sources_show_a_flank_are_not_compared() {
+    // The right fifth of the last stone of each course is folded back, as of a stone at the corner of a pier.
+    let mut stones = wall(&ERRORS, 0.001, 3);
+    for stone in stones.iter_mut().skip(4).step_by(5) {
+        let edge = stone.centroid.y + 0.07;
+        for sight in &mut stone.sights {
+            let folded = |p: Point3<f64>| match p.y > edge {
+                true => Point3::new(p.x - (p.y - edge), edge, p.z),
+                false => p,
+            };
+            let points = (0..sight.points.len()).map(|i| folded(sight.points.world(i)));
+            sight.points = Cloud::from_world(stone.centroid, points.collect::<Vec<_>>());
+        }
+    }
+    let sources = sources(2);
+    let pair = EpochPair::new(&sources, &stones, 0.001);
+    let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
+    assert_eq!(found.observations, [16, 16, 0]);
+}
+
+#[test]
 fn a_few_stones_that_a_source_shows_wrong_leave_the_errors_of_the_others() {
     let moved = |k: usize, p: Point3<f64>| p + Vector3::new(0.02, 0.0, 0.01) * (k as f64 / 6.0 - 1.0);
     let (all, found) = (with_others(|_| false, moved), with_others(|k| k % 6 == 2, moved));
