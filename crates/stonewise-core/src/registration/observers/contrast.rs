@@ -139,6 +139,9 @@ impl Comparison {
             .filter(|s| sources[s.source].epoch == epoch && s.points.len() >= params.min_points)
             .map(|s| (s, thinned(&s.points, params.max_points)))
             .collect();
+        if seen.len() < 2 {
+            return None;
+        }
         seen.sort_by_key(|(s, _)| (std::cmp::Reverse(s.points.len()), s.source));
         let shown = FaceCells::of_clouds(seen.iter().map(|(_, cloud)| cloud), &stone.normal);
         let widest = shown.iter().max_by_key(|cells| cells.by_place.len())?;

@@ -13,7 +13,7 @@ const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
 #[derive(Default)]
 pub struct FileNames {
     taken: BTreeSet<String>,
-    /// How often each name was asked for.
+    /// How often each name occurred.
     tries: BTreeMap<String, usize>,
 }
 

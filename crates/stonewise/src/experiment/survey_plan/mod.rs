@@ -134,7 +134,7 @@ fn survey(
     Ok((summary, squares))
 }
 
-/// The project of a simulated survey, with what the plan knows of it.
+/// The project of a simulated survey, with what the plan states about its errors.
 fn project(plan: &SurveyPlan, folder: &Path) -> Result<Project> {
     let mut project = Project::read(&folder.join("stonewise.toml"))?;
     let registration = &mut project.settings.registration;
