@@ -99,9 +99,11 @@ class Cloud:
     def close(self, bend, random):
         """Bends the wall as it is told, for four stations; the wall as it was, with the ground.
 
-        The ends of the wall of a tower do not meet. The new ground is three metres wide.
+        The ends of the wall of a tower do not meet; what would lie in the other end is cut off. The new ground is three
+        metres wide.
         """
-        self.keep((abs(self.places[:, 0]) < FACE_M) & (self.places[:, 2] > FOOT_M))
+        around = abs(self.places[:, 1]) < np.pi * bend.radius
+        self.keep((abs(self.places[:, 0]) < FACE_M) & (self.places[:, 2] > FOOT_M) & around)
         ground = random.random((60000, 3)) * [3.0, 2 * np.pi * bend.radius, 0.0]
         ground[:, 1] -= np.pi * bend.radius
         self.add(ground, 20000, NO_STONE, random)

@@ -5,7 +5,7 @@ use super::covered::covered;
 use super::error::AdjustError;
 use super::hypothesis::{LikelihoodRatio, LikelihoodRatioTest, Placed, Probe};
 use super::observation::surface::{
-    Correlation, Equations, LocalPair, NoiseFactors, deviance, estimate_noise,
+    Correlation, Equations, LocalPair, NoiseFactors, estimate_noise, likely_roughness,
 };
 use super::state::{Adjustment, StoneState};
 use super::stone_vector::StoneVector;
@@ -13,13 +13,6 @@ use super::survey::Points;
 use crate::progress::Interrupted;
 use crate::registration::points::{PairPoints, PairSource};
 use rayon::prelude::*;
-
-/// Standard deviation of the logarithm of a stone's roughness over that of most stones: between smooth plaster and
-/// rubble lie a factor of a hundred, four standard deviations.
-const ROUGHNESS_SD: f64 = 1.2;
-/// Step and range of the roughness.
-const ROUGHNESS_STEP: f64 = 2.0;
-const ROUGHEST: f64 = 100.0;
 
 /// What a stone's points say where it moved since the last evaluation.
 struct Evaluation {
@@ -30,8 +23,7 @@ struct Evaluation {
 }
 
 impl Adjustment {
-    /// Estimates the noise of the points at the stones' present motions; all equations are then evaluated
-    /// anew.
+    /// Estimates the noise of the points at the stones' present motions; all equations are then evaluated anew.
     pub fn estimate_noise(&mut self, sample: &[(usize, PairPoints)]) {
         let sample: Vec<(LocalPair, StoneVector)> = sample
             .par_iter()
@@ -43,12 +35,18 @@ impl Adjustment {
         let views: Vec<(&LocalPair, StoneVector)> = sample.iter().map(|(p, x)| (p, *x)).collect();
         self.surface.noise = estimate_noise(&views, &self.surface.noise, &self.surface.layout);
         for stone in &mut self.stones {
-            stone.is_roughness_due = true;
             stone.with_field.surface.invalidate();
             if let Some(own) = &mut stone.on_own {
                 own.surface.invalidate();
             }
         }
+    }
+
+    /// Has the roughness of each stone estimated at the next evaluation.
+    pub fn renew_roughness(&mut self) {
+        self.stones
+            .iter_mut()
+            .for_each(|stone| stone.is_roughness_due = true);
     }
 
     /// The points of a stone in its frame.
@@ -142,37 +140,12 @@ impl Adjustment {
         })
     }
 
-    /// The roughness of a stone over that of most under which its points are most likely where it is, found in steps of
-    /// two from the present one.
+    /// The roughness of a stone over that of most under which its points are most likely where it is.
     fn likely_roughness(&self, stone: &StoneState, pair: &LocalPair) -> f64 {
-        let motion = &stone.more_probable().motion;
         // Equations from which the stone's own factor could follow are yet to be evaluated.
         let inflation = self.surface.correlation.factor();
-        let counting = pair.counting(motion, |_| true);
-        let value = |roughness: f64| {
-            let noise = self.surface.noise.on_surface(roughness / pair.noise.roughness);
-            let prior = (roughness.ln() / ROUGHNESS_SD).powi(2);
-            deviance(&counting, motion, &noise, &self.surface.layout) / inflation + prior
-        };
-        let start = (stone.roughness, value(stone.roughness));
-        let descend = |factor: f64| {
-            let mut best = start;
-            loop {
-                let next = factor * best.0;
-                if !(ROUGHEST.recip()..=ROUGHEST).contains(&next) {
-                    return best;
-                }
-                match value(next) {
-                    found if found < best.1 => best = (next, found),
-                    _ => return best,
-                }
-            }
-        };
-        let smoother = descend(ROUGHNESS_STEP.recip());
-        match smoother.1 < start.1 {
-            true => smoother.0,
-            false => descend(ROUGHNESS_STEP).0,
-        }
+        let motion = &stone.more_probable().motion;
+        likely_roughness(pair, motion, inflation, &self.surface.noise, &self.surface.layout)
     }
 
     /// Tries stones whose points leave their motion open at a distance, and follows each from the best place
@@ -379,6 +352,7 @@ mod tests {
         let (mut adjustment, points) = begun(&pairs);
         for _ in 0..3 {
             adjustment.estimate_noise(&points.sample);
+            adjustment.renew_roughness();
             adjustment.evaluate(&points).unwrap();
         }
         let sd = |i: usize| {

@@ -107,6 +107,11 @@ impl<'r, 'a, S: PairSource> Iteration<'r, 'a, S> {
         self.0.adjustment.estimate_noise(&self.0.points.sample);
     }
 
+    /// Has the roughness of each stone estimated where it is now.
+    pub fn renew_roughness(&mut self) {
+        self.0.adjustment.renew_roughness();
+    }
+
     /// Evaluates the points of all stones that moved since they were last evaluated.
     pub fn evaluate(self) -> Result<Evaluated<'r, 'a, S>, AdjustError<S::Error>> {
         self.0.adjustment.evaluate(&self.0.points)?;

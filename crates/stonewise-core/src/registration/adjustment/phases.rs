@@ -50,6 +50,10 @@ impl<'a, S: PairSource> Surveyed<'a, S> {
             let Some(mut iteration) = run.begin() else { break };
             if round % NOISE_EVERY == 0 {
                 iteration.estimate_noise();
+                // At first that of most stones is off by a factor, and stones do not lie on each other yet.
+                if round > 0 {
+                    iteration.renew_roughness();
+                }
             }
             let mut evaluated = iteration.evaluate()?;
             evaluated.update_components()?;
@@ -69,6 +73,7 @@ impl<'a, S: PairSource> Aligned<'a, S> {
         let mut run = self.0;
         if let Some(mut iteration) = run.begin() {
             iteration.estimate_noise();
+            iteration.renew_roughness();
             let mut evaluated = iteration.evaluate()?.restart()?;
             evaluated.probe()?;
             evaluated.solve_and_reweight()?.step();

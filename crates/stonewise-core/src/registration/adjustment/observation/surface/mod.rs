@@ -15,6 +15,7 @@ mod patch_grid;
 mod patches;
 mod robust;
 mod slope_scatter;
+mod stone_roughness;
 mod surface_noise;
 #[cfg(test)]
 mod testing;
@@ -27,6 +28,7 @@ pub(crate) use linearisation::Linearisation;
 pub(crate) use local_pair::LocalPair;
 pub(crate) use model::{Inflation, StoneSurface, SurfaceModel};
 pub(crate) use noise_estimate::estimate_noise;
+pub(crate) use stone_roughness::likely_roughness;
 pub(crate) use surface_noise::{NoiseFactors, SurfaceNoise};
 #[cfg(test)]
 pub(crate) use testing::without_points;

@@ -155,7 +155,8 @@ fn scatter(patch: &PatchPoints, noise: &SurfaceNoise, layout: &Layout) -> [f64; 
     })
 }
 
-fn reweighted(patches: &[PatchPoints], noise: &SurfaceNoise, layout: &Layout) -> Vec<PatchPoints> {
+/// The patches with the weights that their points have on the surface that fits them.
+pub(super) fn reweighted(patches: &[PatchPoints], noise: &SurfaceNoise, layout: &Layout) -> Vec<PatchPoints> {
     patches
         .par_iter()
         .map(|p| {
@@ -166,7 +167,8 @@ fn reweighted(patches: &[PatchPoints], noise: &SurfaceNoise, layout: &Layout) ->
         .collect()
 }
 
-fn deviance(patches: &[PatchPoints], noise: &SurfaceNoise) -> f64 {
+/// Minus twice the log marginal likelihood of the points with these weights, up to a constant.
+pub(super) fn deviance(patches: &[PatchPoints], noise: &SurfaceNoise) -> f64 {
     let terms: Vec<f64> = patches
         .par_iter()
         .map(|p| {
