@@ -99,8 +99,8 @@ class Cloud:
     def close(self, bend, random):
         """Bends the wall as it is told, for four stations; the wall as it was, with the ground.
 
-        The ends of the wall of a tower do not meet; what would lie in the other end is cut off. The new ground is three
-        metres wide.
+        The ends of the wall of a tower do not meet; points beyond the girth, which would overlap the other end, are cut
+        off. The new ground is three metres wide.
         """
         around = abs(self.places[:, 1]) < np.pi * bend.radius
         self.keep((abs(self.places[:, 0]) < FACE_M) & (self.places[:, 2] > FOOT_M) & around)

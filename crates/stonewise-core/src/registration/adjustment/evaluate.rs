@@ -42,8 +42,8 @@ impl Adjustment {
         }
     }
 
-    /// Has the roughness of each stone estimated at the next evaluation.
-    pub fn renew_roughness(&mut self) {
+    /// Marks the roughness of every stone to be estimated at its next evaluation.
+    pub fn mark_roughness_due(&mut self) {
         self.stones
             .iter_mut()
             .for_each(|stone| stone.is_roughness_due = true);
@@ -140,7 +140,7 @@ impl Adjustment {
         })
     }
 
-    /// The roughness of a stone over that of most under which its points are most likely where it is.
+    /// Most likely roughness of a stone at its present motion, as a factor on the usual one.
     fn likely_roughness(&self, stone: &StoneState, pair: &LocalPair) -> f64 {
         // Equations from which the stone's own factor could follow are yet to be evaluated.
         let inflation = self.surface.correlation.factor();
@@ -352,7 +352,7 @@ mod tests {
         let (mut adjustment, points) = begun(&pairs);
         for _ in 0..3 {
             adjustment.estimate_noise(&points.sample);
-            adjustment.renew_roughness();
+            adjustment.mark_roughness_due();
             adjustment.evaluate(&points).unwrap();
         }
         let sd = |i: usize| {

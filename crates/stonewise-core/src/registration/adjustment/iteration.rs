@@ -107,9 +107,9 @@ impl<'r, 'a, S: PairSource> Iteration<'r, 'a, S> {
         self.0.adjustment.estimate_noise(&self.0.points.sample);
     }
 
-    /// Has the roughness of each stone estimated where it is now.
-    pub fn renew_roughness(&mut self) {
-        self.0.adjustment.renew_roughness();
+    /// Marks the roughness of every stone to be estimated at its next evaluation.
+    pub fn mark_roughness_due(&mut self) {
+        self.0.adjustment.mark_roughness_due();
     }
 
     /// Evaluates the points of all stones that moved since they were last evaluated.

@@ -50,9 +50,10 @@ impl<'a, S: PairSource> Surveyed<'a, S> {
             let Some(mut iteration) = run.begin() else { break };
             if round % NOISE_EVERY == 0 {
                 iteration.estimate_noise();
-                // At first that of most stones is off by a factor, and stones do not lie on each other yet.
+                // In the first round the epochs are not aligned, so the usual roughness, to which each stone's is
+                // relative, is still wrong by a factor.
                 if round > 0 {
-                    iteration.renew_roughness();
+                    iteration.mark_roughness_due();
                 }
             }
             let mut evaluated = iteration.evaluate()?;
@@ -67,13 +68,13 @@ impl<'a, S: PairSource> Surveyed<'a, S> {
 pub(super) struct Aligned<'a, S>(Run<'a, S>);
 
 impl<'a, S: PairSource> Aligned<'a, S> {
-    /// Estimates the noise for good, returns stones from false optima, and tries stones far from the field's
+    /// Estimates noise and roughness for good, returns stones from false optima, and tries stones far from the field's
     /// motion.
     pub fn probe(self) -> Phase<Probed<'a, S>, S> {
         let mut run = self.0;
         if let Some(mut iteration) = run.begin() {
             iteration.estimate_noise();
-            iteration.renew_roughness();
+            iteration.mark_roughness_due();
             let mut evaluated = iteration.evaluate()?.restart()?;
             evaluated.probe()?;
             evaluated.solve_and_reweight()?.step();

@@ -56,7 +56,7 @@ pub(crate) fn estimate_noise(
     let [mut width, least_width] = WIDTHS;
     for _ in 0..STEPS {
         let weighted = reweighted(&patches, &from_log(log), layout);
-        let value = |log: [f64; 3]| deviance(&weighted, &from_log(log));
+        let value = |log: [f64; 3]| deviance_of_weighted(&weighted, &from_log(log));
         let next = downhill(log, width, value);
         let change = (0..3).map(|k| (next[k] - log[k]).abs()).fold(0.0, f64::max);
         log = next;
@@ -155,20 +155,20 @@ fn scatter(patch: &PatchPoints, noise: &SurfaceNoise, layout: &Layout) -> [f64; 
     })
 }
 
-/// The patches with the weights that their points have on the surface that fits them.
+/// Copies of the patches, their points weighted by a robust fit of the surface; without patches that cannot be fitted.
 pub(super) fn reweighted(patches: &[PatchPoints], noise: &SurfaceNoise, layout: &Layout) -> Vec<PatchPoints> {
     patches
         .par_iter()
-        .map(|p| {
+        .filter_map(|p| {
             let mut epochs = p.epochs.clone();
-            robust_fit(p.grid, &mut epochs, &noise.on_surface(p.roughness), layout);
-            PatchPoints { epochs, ..*p }
+            robust_fit(p.grid, &mut epochs, &noise.on_surface(p.roughness), layout)?;
+            Some(PatchPoints { epochs, ..*p })
         })
         .collect()
 }
 
 /// Minus twice the log marginal likelihood of the points with these weights, up to a constant.
-pub(super) fn deviance(patches: &[PatchPoints], noise: &SurfaceNoise) -> f64 {
+pub(super) fn deviance_of_weighted(patches: &[PatchPoints], noise: &SurfaceNoise) -> f64 {
     let terms: Vec<f64> = patches
         .par_iter()
         .map(|p| {
