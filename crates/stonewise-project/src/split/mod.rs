@@ -10,6 +10,7 @@ use half::{half_folder, half_name};
 use halves_edits::halves_edits;
 use photos::{copy_photos, shuffled_photos};
 use std::fmt::Write as _;
+use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::{Error, Result};
 use stonewise_base::files::write_text;
@@ -141,6 +142,8 @@ fn write_clouds(
     progress: &dyn Progress,
 ) -> Result<Vec<String>> {
     let mut names = Vec::new();
+    let folder = out.join(half_folder(half));
+    fs::create_dir_all(&folder).map_err(Error::io("making a folder", &folder))?;
     for (number, cloud) in epoch.clouds.iter().enumerate() {
         let name = format!("{}/cloud_{}.laz", half_folder(half), number + 1);
         progress.begin(
@@ -161,4 +164,32 @@ fn write_clouds(
 fn absolute(path: &Path) -> Result<String> {
     let path = dunce::canonicalize(path).map_err(Error::io("finding", path))?;
     Ok(quoted(&path.to_string_lossy()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scans::ScansProject;
+    use stonewise_core::epoch::EpochId;
+    use stonewise_core::progress::Silent;
+
+    #[test]
+    fn scans_alone_are_divided_too() {
+        let dir = tempfile::tempdir().unwrap();
+        let scans = ["a.xyz", "b.xyz"].map(|name| dir.path().join(name));
+        let points: String = (0..1000).map(|i| format!("{i} 0 1\n")).collect();
+        for scan in &scans {
+            fs::write(scan, &points).unwrap();
+        }
+        let project = ScansProject::new(&scans, dir.path()).unwrap().project;
+        let out = dir.path().join("halves");
+        fs::create_dir(&out).unwrap();
+        split(&project, &project.epochs[EpochId::REFERENCE], 1, &out, &Silent).unwrap();
+        let points = ["half1", "half2"].map(|half| {
+            let cloud = out.join(half).join("cloud_1.laz");
+            claimed_records(&cloud).unwrap().unwrap()
+        });
+        assert_eq!(points.iter().sum::<u64>(), 1000);
+        assert!(points.iter().all(|p| *p > 400), "{points:?}");
+    }
 }
