@@ -17,7 +17,7 @@ use crate::registration::points::PairSource;
 /// survey -> align -> probe -> track, where there are photos -> weigh -> settle -> part along a crack or let a
 /// creeping zone move, then weigh and settle again, until none is left -> report.
 ///
-/// Cost: about ten evaluations of all points and ten sparse factorisations.
+/// Cost: four approximate and about four exact evaluations of all points, and a dozen sparse factorisations.
 ///
 /// ```
 /// use nalgebra::{Point3, Vector3};

@@ -5,7 +5,7 @@ use super::covered::covered;
 use super::error::AdjustError;
 use super::hypothesis::{LikelihoodRatio, LikelihoodRatioTest, Placed, Probe};
 use super::observation::surface::{
-    Correlation, Equations, LocalPair, NoiseFactors, estimate_noise, likely_roughness,
+    Correlation, Effort, Equations, LocalPair, NoiseFactors, estimate_noise, likely_roughness,
 };
 use super::state::{Adjustment, StoneState};
 use super::stone_vector::StoneVector;
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 /// What a stone's points say where it moved since the last evaluation.
 struct Evaluation {
-    with_field: Option<Equations>,
+    with_field: Equations,
     on_own: Option<Equations>,
     ratio: Option<LikelihoodRatio>,
     roughness: f64,
@@ -34,6 +34,19 @@ impl Adjustment {
             .collect();
         let views: Vec<(&LocalPair, StoneVector)> = sample.iter().map(|(p, x)| (p, *x)).collect();
         self.surface.noise = estimate_noise(&views, &self.surface.noise, &self.surface.layout);
+        self.invalidate();
+    }
+
+    /// Sets how exactly stones are evaluated from now on. Approximate equations are then evaluated anew.
+    pub fn set_effort(&mut self, effort: Effort) {
+        if self.surface.effort == Effort::Aligning && effort != Effort::Aligning {
+            self.invalidate();
+        }
+        self.surface.effort = effort;
+    }
+
+    /// Forgets all equations.
+    fn invalidate(&mut self) {
         for stone in &mut self.stones {
             stone.with_field.surface.invalidate();
             if let Some(own) = &mut stone.on_own {
@@ -115,7 +128,9 @@ impl Adjustment {
         let roughness = local.noise.roughness;
         let anew = |candidate: &CandidateMotion| {
             let window = candidate.surface.window(&candidate.motion);
-            self.surface.equations(&local, &candidate.motion, &window)
+            let weights = candidate.surface.weights(&candidate.motion);
+            self.surface
+                .equations(&local, &candidate.motion, &window, weights)
         };
 
         let compare = |own: &CandidateMotion| {
@@ -129,12 +144,11 @@ impl Adjustment {
             test.run(self.surface.inflation_of_all(stone.surface()))
         };
 
+        // The ratio is that of both present motions, so the equations must belong to them as well.
         let own = stone.on_own.as_ref();
         Some(Evaluation {
-            with_field: Some(&stone.with_field)
-                .filter(|c| self.is_candidate_due(c))
-                .map(anew),
-            on_own: own.filter(|c| self.is_candidate_due(c)).map(anew),
+            with_field: anew(&stone.with_field),
+            on_own: own.map(anew),
             ratio: own.map(compare),
             roughness,
         })
@@ -201,10 +215,8 @@ impl Evaluation {
         stone.ratio = self.ratio.unwrap_or_default();
         stone.roughness = self.roughness;
         stone.is_roughness_due = false;
-        if let Some(equations) = self.with_field {
-            let at = stone.with_field.motion;
-            stone.with_field.surface.set(at, equations);
-        }
+        let at = stone.with_field.motion;
+        stone.with_field.surface.set(at, self.with_field);
         if let (Some(equations), Some(own)) = (self.on_own, &mut stone.on_own) {
             own.surface.set(own.motion, equations);
         }
@@ -220,6 +232,7 @@ fn placed(candidate: &CandidateMotion) -> Placed {
 
 #[cfg(test)]
 mod tests {
+    use super::super::observation::surface::PointWeights;
     use super::super::testing::{begun, wall};
     use super::*;
     use crate::cloud::Cloud;
@@ -303,7 +316,7 @@ mod tests {
         let gradient =
             |a: &Adjustment, i: usize| a.stones[i].with_field.surface.equations().unwrap().gradient;
         let before = [0, 70, 71].map(|i| gradient(&adjustment, i));
-        let moved = true_motion(&adjustment, 70, Vector3::new(0.0, 0.001, 0.0));
+        let moved = true_motion(&adjustment, 70, Vector3::new(0.0, 0.002, 0.0));
         adjustment.stones[70].with_field.motion = moved;
         adjustment.evaluate(&points).unwrap();
         assert_eq!(source.loads(), [2, 3]);
@@ -311,7 +324,9 @@ mod tests {
         // Brute force: the stone's points alone at its new motion.
         let frame = &adjustment.prior.graph.nodes[70].face_from_world;
         let local = LocalPair::new(&source.pairs.pairs()[70], frame, NoiseFactors::USUAL);
-        let alone = adjustment.surface.equations(&local, &moved, &moved);
+        let alone = adjustment
+            .surface
+            .equations(&local, &moved, &moved, &PointWeights::NONE);
         assert_eq!(gradient(&adjustment, 70), alone.gradient);
         assert_ne!(alone.gradient, before[1]);
     }

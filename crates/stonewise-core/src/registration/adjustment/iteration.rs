@@ -3,6 +3,7 @@
 use super::equations::StoneEquations;
 use super::error::AdjustError;
 use super::field::Field;
+use super::observation::surface::Effort;
 use super::outcome;
 use super::params::{AdjustmentParams, AdjustmentReport};
 use super::solution::Solution;
@@ -48,9 +49,17 @@ impl<'a, S: PairSource> Run<'a, S> {
             return None;
         }
         self.iterations += 1;
+        if self.iterations == self.allowed {
+            self.set_effort(Effort::Settling);
+        }
         let what = format!("iteration {}", self.iterations);
         self.points.progress.begin(&what, self.stones() as u64);
         Some(Iteration(self))
+    }
+
+    /// Sets how exactly stones are evaluated from now on; the last iteration is exact whatever is set.
+    pub fn set_effort(&mut self, effort: Effort) {
+        self.adjustment.set_effort(effort);
     }
 
     /// Tracks the stones in the photos from where they are now.

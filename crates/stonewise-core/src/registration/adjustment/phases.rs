@@ -3,6 +3,7 @@
 
 use super::error::AdjustError;
 use super::iteration::Run;
+use super::observation::surface::Effort;
 use super::params::{AdjustmentParams, AdjustmentReport};
 use super::survey::Survey;
 use crate::registration::photos::PhotoSource;
@@ -11,7 +12,7 @@ use crate::registration::points::PairSource;
 /// Iterations of the alignment: the first two bring stones within reach of their relief, the others let noise
 /// and variance components follow.
 const ALIGNMENTS: usize = 4;
-/// The noise is estimated in every second iteration of the alignment: it costs as much as an evaluation, and
+/// The noise is estimated in every second iteration of the alignment: all stones are then evaluated anew, and it
 /// changes by a percent in between.
 const NOISE_EVERY: usize = 2;
 /// Iterations in which the weights of stones and ties settle, and in which of them the variance components
@@ -46,6 +47,7 @@ impl<'a, S: PairSource> Surveyed<'a, S> {
     /// Brings the stones onto each other, while noise and variance components become about right.
     pub fn align(self) -> Phase<Aligned<'a, S>, S> {
         let mut run = self.0;
+        run.set_effort(Effort::Aligning);
         for round in 0..ALIGNMENTS {
             let Some(mut iteration) = run.begin() else { break };
             if round % NOISE_EVERY == 0 {
@@ -72,6 +74,7 @@ impl<'a, S: PairSource> Aligned<'a, S> {
     /// motion.
     pub fn probe(self) -> Phase<Probed<'a, S>, S> {
         let mut run = self.0;
+        run.set_effort(Effort::Weighing);
         if let Some(mut iteration) = run.begin() {
             iteration.estimate_noise();
             iteration.mark_roughness_due();
@@ -104,6 +107,7 @@ impl<'a, S: PairSource> Tracked<'a, S> {
     /// Estimates the variance components; the weights of stones and ties, and the photos' poses, follow.
     pub fn weigh(self) -> Phase<Weighed<'a, S>, S> {
         let mut run = self.0;
+        run.set_effort(Effort::Weighing);
         for round in 0..WEIGHINGS {
             let Some(iteration) = run.begin() else { break };
             let mut evaluated = iteration.evaluate()?;
@@ -124,6 +128,7 @@ impl<'a, S: PairSource> Weighed<'a, S> {
     /// Iterates with frozen weights and components until no stone moves.
     pub fn settle(self) -> Phase<Settled<'a, S>, S> {
         let mut run = self.0;
+        run.set_effort(Effort::Settling);
         run.forget_swings();
         let mut is_begun = false;
         while let Some(iteration) = run.begin() {

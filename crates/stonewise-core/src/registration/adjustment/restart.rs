@@ -7,7 +7,7 @@
 use super::candidate::CandidateMotion;
 use super::error::AdjustError;
 use super::hypothesis::{LikelihoodRatioTest, Placed};
-use super::observation::surface::LocalPair;
+use super::observation::surface::{LocalPair, PointWeights};
 use super::state::Adjustment;
 use super::stone_vector::{Matrix9, StoneVector};
 use super::survey::Points;
@@ -63,7 +63,7 @@ impl Adjustment {
     /// and their points do not make it more probable that they are on their own there. Beforehand that is as
     /// improbable as a loose stone.
     ///
-    /// Cost: for these stones, as much as an alignment.
+    /// Cost: for these stones, four exact evaluations a place.
     pub fn restart<S: PairSource>(&mut self, points: &Points<S>) -> Result<(), AdjustError<S::Error>> {
         let elsewhere: Vec<Vec<StoneVector>> = self
             .surroundings()
@@ -148,7 +148,7 @@ impl Adjustment {
     fn settled_from(&self, local: &LocalPair, start: StoneVector, inflation: f64) -> Option<StoneVector> {
         let mut at = start;
         for _ in 0..STEPS {
-            let e = self.surface.equations(local, &at, &at);
+            let e = self.surface.equations(local, &at, &at, &PointWeights::NONE);
             let held = e.information + Matrix9::identity() * inflation / self.params.loose_move_m.powi(2);
             let step = StoneVector::from(held.cholesky()?.solve(&e.gradient));
             let length = step.translation().norm();

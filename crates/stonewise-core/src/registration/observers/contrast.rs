@@ -7,7 +7,7 @@ use crate::geometry::FaceFrame;
 use crate::id::StoneId;
 use crate::params::{Params, Range, Ranged, with_ranges};
 use crate::registration::adjustment::observation::surface::{
-    Equations, Layout, LocalPair, NoiseFactors, SurfaceNoise, equations::equations, estimate_noise,
+    Equations, FitOptions, Layout, LocalPair, NoiseFactors, SurfaceNoise, equations, estimate_noise,
 };
 use crate::registration::adjustment::stone_vector::StoneVector;
 use crate::registration::points::{PairPoints, face_spacing};
@@ -200,7 +200,7 @@ impl Comparison {
         layout: &Layout,
     ) -> Translation {
         let x = self.motion(shift);
-        let e = equations(&self.pairs[k], &x, &x, noise, layout);
+        let e = equations(&self.pairs[k], &x, &x, noise, layout, &FitOptions::EXACT);
         Translation::new(&e, shift, &self.face_from_world)
     }
 

@@ -92,7 +92,7 @@ mod tests {
     use crate::geometry::FaceFrame;
     use crate::id::StoneId;
     use crate::registration::adjustment::observation::surface::NoiseFactors;
-    use crate::registration::adjustment::observation::surface::equations::equations;
+    use crate::registration::adjustment::observation::surface::{FitOptions, equations};
     use crate::registration::points::PairPoints;
     use crate::registration::points::{NearPoint, stone_points};
     use nalgebra::{Point3, Vector3};
@@ -191,7 +191,7 @@ mod tests {
         let pair = local_pair(&second);
         let [at_rest, lower] = [Vector3::zeros(), down].map(|d| {
             let x = placed(&d).motion;
-            equations(&pair, &x, &x, &NOISE, &LAYOUT).deviance
+            equations(&pair, &x, &x, &NOISE, &LAYOUT, &FitOptions::EXACT).deviance
         });
         assert!(0.5 * (at_rest - lower) > 20.0, "{at_rest} {lower}");
         assert!(compare(&second, &down).log_ratio < -20.0);

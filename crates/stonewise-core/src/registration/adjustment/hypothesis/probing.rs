@@ -4,7 +4,9 @@
 //! went.
 
 use super::likelihood_ratio::Placed;
-use crate::registration::adjustment::observation::surface::{Equations, LocalPair, SurfaceModel};
+use crate::registration::adjustment::observation::surface::{
+    Equations, LocalPair, PointWeights, SurfaceModel,
+};
 use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
@@ -52,7 +54,9 @@ impl Probe<'_> {
             let (s, c) = (TAU * k as f64 / DIRECTIONS as f64).sin_cos();
             let step = Vector3::new(self.move_m * c, self.move_m * s, 0.0);
             let place = self.here.motion + StoneVector::from_translation(step);
-            let there = self.surface.equations(self.pair, &place, &self.here.window);
+            let there = self
+                .surface
+                .equations(self.pair, &place, &self.here.window, &PointWeights::NONE);
             let value = self.expected_deviance(&there);
             if value < best.0 {
                 best = (value, Some(place));
@@ -136,12 +140,12 @@ mod tests {
             let pair = scans([truth.x, truth.y]);
             let probe = probe(&pair, &surface);
             let zero = StoneVector::zeros();
-            let here = surface.equations(&pair, &zero, &zero);
+            let here = surface.equations(&pair, &zero, &zero, &PointWeights::NONE);
             let found = probe.best(&here).unwrap();
             // The next direction may be as good, because one more step is taken from there.
             let angle = found.translation().angle(&truth);
             assert!(angle < TAU / DIRECTIONS as f64 + 1e-9, "{k}: {angle}");
-            let there = surface.equations(&pair, &found, &zero);
+            let there = surface.equations(&pair, &found, &zero, &PointWeights::NONE);
             let held = there.information + Matrix9::identity() / MOVE_M.powi(2);
             let step = held.cholesky().unwrap().solve(&there.gradient);
             let error = found.translation() - step.fixed_rows::<3>(0) - truth;
@@ -154,7 +158,7 @@ mod tests {
         let surface = model();
         let pair = scans([0.0; 2]);
         let zero = StoneVector::zeros();
-        let here = surface.equations(&pair, &zero, &zero);
+        let here = surface.equations(&pair, &zero, &zero, &PointWeights::NONE);
         assert_eq!(probe(&pair, &surface).best(&here), None);
     }
 

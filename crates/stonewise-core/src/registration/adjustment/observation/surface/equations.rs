@@ -9,6 +9,7 @@ use super::local_pair::LocalPair;
 use super::patch_fit::PatchFit;
 use super::patch_grid::{Basis, PatchGrid, WeightedPoint};
 use super::patches::{PatchPoints, pool_into_patches};
+use super::point_weights::PointWeights;
 use super::robust::{robust_fit, steepness};
 use super::slope_scatter::SlopeScatter;
 use super::surface_noise::SurfaceNoise;
@@ -40,6 +41,8 @@ pub(crate) struct Equations {
     pub points: [usize; 2],
     /// Sum of the points' distances from the surface, outliers and all, in units of sigma, per epoch.
     pub distances: [f64; 2],
+    /// Weights of the points that were fitted.
+    pub weights: PointWeights,
 }
 
 impl Equations {
@@ -57,6 +60,7 @@ impl Equations {
             rms_m: 0.0,
             points: [0; 2],
             distances: [0.0; 2],
+            weights: PointWeights::NONE,
         }
     }
 }
@@ -67,22 +71,56 @@ const CELL_POINTS: f64 = 3.0;
 /// %. Less shows no motion in the face.
 const LEAST_SLOPE: f64 = 1e-3;
 
-/// Normal equations at `motion`, of the points in the stone's window where that moved by `window`. Cost:
-/// points, plus coefficients times patch width squared.
+/// How a stone's surface is fitted.
+pub(crate) struct FitOptions<'a> {
+    /// Whether an approximate gradient suffices, because the stone is still being aligned: of a face of more than two
+    /// patches only every second one is used, as in a chessboard, the gradient of the determinant is left out, and no
+    /// weights are stored.
+    pub is_rough: bool,
+    /// Weights with which the points start.
+    pub weights: &'a PointWeights,
+}
+
+impl FitOptions<'static> {
+    /// Exact, from full weights.
+    pub const EXACT: Self = Self {
+        is_rough: false,
+        weights: &PointWeights::NONE,
+    };
+}
+
+/// Normal equations at `motion`, of the points in the stone's window where that moved by `window`, as far as `options`
+/// use them. Cost: points, plus coefficients times patch width squared.
 pub(crate) fn equations(
     pair: &LocalPair,
     motion: &StoneVector,
     window: &StoneVector,
     noise: &SurfaceNoise,
     layout: &Layout,
+    options: &FitOptions,
 ) -> Equations {
     let noise = &noise.of_stone(&pair.noise);
     let motion = LocalMotion::new(motion);
     let patches = pool_into_patches(pair, &motion, &LocalMotion::new(window), noise, layout);
     let mut sum = Equations::zeros(patches.overlap);
     let mut squares = 0.0;
-    for patch in patches.list {
-        squares += add_patch(patch, &motion, patches.still, noise, layout, &mut sum);
+    if !options.is_rough {
+        sum.weights = PointWeights::full(pair.counts());
+    }
+    let setting = Setting {
+        motion: &motion,
+        still: patches.still,
+        noise,
+        layout,
+        is_rough: options.is_rough,
+    };
+    let used = match options.is_rough {
+        true => every_second(patches.list),
+        false => patches.list,
+    };
+    for mut patch in used {
+        options.weights.apply(&mut patch.epochs);
+        squares += setting.add_patch(patch, &mut sum);
     }
     if sum.points[1] > 0 {
         sum.rms_m = noise.sigma_m[1] * (squares / sum.points[1] as f64).sqrt();
@@ -109,54 +147,77 @@ pub(crate) fn deviance(pair: &LocalPair, motion: &StoneVector, noise: &SurfaceNo
         .sum()
 }
 
-/// Adds what a patch says to the equations; the sum of the second epoch's weighted squared residuals, in units of sigma.
-fn add_patch(
-    PatchPoints { grid, mut epochs, .. }: PatchPoints,
-    motion: &LocalMotion,
-    still: Still,
-    noise: &SurfaceNoise,
-    layout: &Layout,
-    sum: &mut Equations,
-) -> f64 {
-    let Some(fit) = robust_fit(grid, &mut epochs, noise, layout) else {
-        return 0.0;
-    };
-    let mut squares = [0.0; 2];
-    let shares = Shares::new(&grid, &epochs, noise);
-    let mut coupling = vec![[0.0; 9]; grid.coefficient_count()];
-    let mut cells = PatchCells::new(&grid, layout.cell_m);
-    let inverse = fit.factor.inverse();
+/// Of more than two patches those of one colour of a chessboard, the colour that has more of them.
+fn every_second(mut patches: Vec<PatchPoints>) -> Vec<PatchPoints> {
+    let count = patches.len();
+    if count > 2 {
+        let is_dark = 2 * patches.iter().filter(|patch| patch.is_dark).count() > count;
+        patches.retain(|patch| patch.is_dark == is_dark);
+    }
+    patches
+}
 
-    for (epoch, points) in epochs.iter().enumerate() {
-        let sigma = noise.sigma_m[epoch];
-        for o in points {
-            let [h, hu, hv] = fit.surface(&o.basis);
-            let r = o.position[2] - h;
-            cells.add(epoch, o, r, [hu, hv]);
-            sum.points[epoch] += 1;
-            sum.distances[epoch] += r.abs() * steepness([hu, hv]).sqrt() / sigma;
-            squares[epoch] += o.weight * r * r / (sigma * sigma);
-            sum.deviance += o.weight * r * r / (sigma * sigma);
-            let w = o.weight / (sigma * sigma);
-            // The surface follows each point a little, most at the edge of the points, and takes the slope
-            // with it: residuals and slopes are correlated by minus this covariance, which the gradient of
-            // the determinant makes good.
-            let bias = motion.jacobian(still, &o.position, fit.slope_covariance(&o.basis, &inverse));
-            let level = motion.jacobian(still, &o.position, [0.0; 2]);
-            let bias = Vector9::from(bias) - Vector9::from(level);
-            let share = shares.of(epoch, &o.basis);
-            let row = motion.jacobian(still, &o.position, [hu, hv]).map(|j| share * j);
-            let j = Vector9::from(row);
-            sum.gradient += (j * r - bias * share) * w;
-            scatter(&o.basis, w, &row, &mut coupling);
-            sum.information.syger(w, &j, &j, 1.0);
+/// At which motion and with which noise the patches of a stone are evaluated.
+struct Setting<'a> {
+    motion: &'a LocalMotion,
+    still: Still,
+    noise: &'a SurfaceNoise,
+    layout: &'a Layout,
+    is_rough: bool,
+}
+
+impl Setting<'_> {
+    /// Adds what a patch says to the equations; the sum of the second epoch's weighted squared residuals, in units of
+    /// sigma.
+    fn add_patch(&self, PatchPoints { grid, mut epochs, .. }: PatchPoints, sum: &mut Equations) -> f64 {
+        let noise = self.noise;
+        let Some(fit) = robust_fit(grid, &mut epochs, noise, self.layout) else {
+            return 0.0;
+        };
+        sum.weights.store(&epochs);
+        let mut squares = [0.0; 2];
+        let shares = Shares::new(&grid, &epochs, noise);
+        let mut coupling = vec![[0.0; 9]; grid.coefficient_count()];
+        let mut cells = PatchCells::new(&grid, self.layout.cell_m);
+        let inverse = (!self.is_rough).then(|| fit.factor.inverse());
+
+        for (epoch, points) in epochs.iter().enumerate() {
+            let sigma = noise.sigma_m[epoch];
+            for o in points {
+                let [h, hu, hv] = fit.surface(&o.basis);
+                let r = o.position[2] - h;
+                cells.add(epoch, o, r, [hu, hv]);
+                sum.points[epoch] += 1;
+                sum.distances[epoch] += r.abs() * steepness([hu, hv]).sqrt() / sigma;
+                squares[epoch] += o.weight * r * r / (sigma * sigma);
+                sum.deviance += o.weight * r * r / (sigma * sigma);
+                let w = o.weight / (sigma * sigma);
+                let share = shares.of(epoch, &o.basis);
+                let row = self.jacobian(o, [hu, hv]).map(|j| share * j);
+                let j = Vector9::from(row);
+                sum.gradient += j * (r * w);
+                if let Some(inverse) = &inverse {
+                    // The surface follows each point a little, most at the edge of the points, and takes the slope
+                    // with it: residuals and slopes are correlated by minus this covariance, which the gradient of
+                    // the determinant makes good.
+                    let bias = self.jacobian(o, fit.slope_covariance(&o.basis, inverse));
+                    let level = self.jacobian(o, [0.0; 2]);
+                    sum.gradient -= (Vector9::from(bias) - Vector9::from(level)) * (share * w);
+                }
+                scatter(&o.basis, w, &row, &mut coupling);
+                sum.information.syger(w, &j, &j, 1.0);
+            }
         }
+
+        sum.deviance += fit.surface_deviance(noise) - epochs.iter().map(Vec::len).sum::<usize>() as f64;
+        take_off_surface(&fit, coupling, &mut sum.information);
+        cells.finish(noise, sum);
+        squares[1]
     }
 
-    sum.deviance += fit.surface_deviance(noise) - epochs.iter().map(Vec::len).sum::<usize>() as f64;
-    take_off_surface(&fit, coupling, &mut sum.information);
-    cells.finish(noise, sum);
-    squares[1]
+    fn jacobian(&self, point: &WeightedPoint, slopes: [f64; 2]) -> [f64; 9] {
+        self.motion.jacobian(self.still, &point.position, slopes)
+    }
 }
 
 /// How the epochs share the stone's motion at each place of a patch: each takes the more of it, the less its
@@ -287,6 +348,10 @@ mod tests {
         sigma_m: [0.004, 0.005],
         tau_m: 0.01,
     };
+    const ROUGH: FitOptions = FitOptions {
+        is_rough: true,
+        ..FitOptions::EXACT
+    };
     const LAYOUT: Layout = Layout {
         cell_m: 0.02,
         patch_cells: 24,
@@ -313,7 +378,7 @@ mod tests {
     fn the_gradient_is_that_of_the_marginal_likelihood() {
         for beside in [0.0, 0.02] {
             let pair = scans(beside);
-            let at = |x: &StoneVector| equations(&pair, x, x, &NOISE, &LAYOUT);
+            let at = |x: &StoneVector| equations(&pair, x, x, &NOISE, &LAYOUT, &FitOptions::EXACT);
             let here = at(&StoneVector::zeros());
             for k in 0..6 {
                 let step = 1e-3 * here.information[(k, k)].sqrt().recip();
@@ -346,7 +411,7 @@ mod tests {
         for beside in [0.05, 0.1, 0.15, 0.19, 0.3] {
             let pair = scans(beside);
             let x = StoneVector::zeros();
-            let information = equations(&pair, &x, &x, &NOISE, &layout).information;
+            let information = equations(&pair, &x, &x, &NOISE, &layout, &FitOptions::EXACT).information;
             let eigenvalues = information.symmetric_eigenvalues();
             let scale = information.diagonal().max();
             assert!(eigenvalues.min() >= -1e-9 * scale, "{beside}: {eigenvalues}");
@@ -358,11 +423,26 @@ mod tests {
         let noise = |sigma_m: [f64; 2]| SurfaceNoise { sigma_m, tau_m: 0.01 };
         let pair = scans(0.0);
         let unmoved = LocalMotion::new(&StoneVector::zeros());
-        let exchanged = LocalPair::of_points(pair.second_in(&unmoved), pair.first.clone());
+        let second = pair.second_in(&unmoved).into_iter().map(|(_, q)| q).collect();
+        let exchanged = LocalPair::of_points(second, pair.first.clone());
         let moved = StoneVector::from_translation(Vector3::new(0.004, -0.003, 0.002));
         let back = StoneVector::zeros() - moved;
-        let of_pair = equations(&pair, &moved, &moved, &noise([0.001, 0.005]), &LAYOUT);
-        let of_exchanged = equations(&exchanged, &back, &back, &noise([0.005, 0.001]), &LAYOUT);
+        let of_pair = equations(
+            &pair,
+            &moved,
+            &moved,
+            &noise([0.001, 0.005]),
+            &LAYOUT,
+            &FitOptions::EXACT,
+        );
+        let of_exchanged = equations(
+            &exchanged,
+            &back,
+            &back,
+            &noise([0.005, 0.001]),
+            &LAYOUT,
+            &FitOptions::EXACT,
+        );
 
         let apart = (of_pair.deviance - of_exchanged.deviance).abs();
         assert!(apart < 1e-6 * of_pair.deviance.abs(), "{apart}");
@@ -371,5 +451,142 @@ mod tests {
         assert!((one - other).norm() < 1e-6 * one.norm(), "{one} {other}");
         let [one, other] = [&of_pair, &of_exchanged].map(|e| e.gradient.fixed_rows::<3>(0).into_owned());
         assert!((one + other).norm() < 1e-6 * one.norm(), "{one} {other}");
+    }
+
+    /// Every tenth point of the second epoch stands out by 0.1 m, as leaves do.
+    fn scans_with_outliers() -> LocalPair {
+        let pair = scans(0.0);
+        let unmoved = LocalMotion::new(&StoneVector::zeros());
+        let second = pair.second_in(&unmoved).into_iter();
+        let second = second.map(|(i, [u, v, z])| [u, v, if i % 10 == 0 { z + 0.1 } else { z }]);
+        LocalPair::of_points(pair.first.clone(), second.collect())
+    }
+
+    #[test]
+    fn fits_from_stored_weights_say_what_fits_from_full_weights_say() {
+        let layout = Layout {
+            outlier_sigmas: 3.0,
+            ..LAYOUT
+        };
+        let pair = scans_with_outliers();
+        let x = StoneVector::zeros();
+        let before = equations(&pair, &x, &x, &NOISE, &layout, &FitOptions::EXACT);
+        let x = StoneVector::from_translation(Vector3::new(1e-4, -1e-4, 1e-4));
+        let anew = equations(&pair, &x, &x, &NOISE, &layout, &FitOptions::EXACT);
+        let options = FitOptions {
+            weights: &before.weights,
+            ..FitOptions::EXACT
+        };
+        let from_stored = equations(&pair, &x, &x, &NOISE, &layout, &options);
+
+        let factor = anew.information.cholesky().unwrap();
+        let apart = factor.solve(&(from_stored.gradient - anew.gradient));
+        for k in 0..6 {
+            let sd = factor.inverse()[(k, k)].sqrt();
+            assert!(apart[k].abs() < 0.05 * sd, "{k}: {} of {sd}", apart[k]);
+        }
+        let relative = (from_stored.information - anew.information).norm() / anew.information.norm();
+        assert!(relative < 0.02, "{relative}");
+        assert_ne!(from_stored.gradient, anew.gradient);
+    }
+
+    #[test]
+    fn outliers_keep_their_small_weights() {
+        let layout = Layout {
+            outlier_sigmas: 3.0,
+            ..LAYOUT
+        };
+        let pair = scans_with_outliers();
+        let x = StoneVector::zeros();
+        let stored = equations(&pair, &x, &x, &NOISE, &layout, &FitOptions::EXACT).weights;
+        let motion = LocalMotion::new(&x);
+        let mut patch = pool_into_patches(&pair, &motion, &motion, &NOISE, &layout)
+            .list
+            .remove(0);
+        stored.apply(&mut patch.epochs);
+        for point in &patch.epochs[1] {
+            let is_outlier = point.index % 10 == 0;
+            assert_eq!(
+                point.weight < 0.2,
+                is_outlier,
+                "{}: {}",
+                point.index,
+                point.weight
+            );
+        }
+    }
+
+    #[test]
+    fn half_of_the_patches_lead_to_the_same_motion() {
+        let layout = Layout {
+            patch_cells: 5,
+            ..LAYOUT
+        };
+        let pair = scans(0.0);
+        // The epochs did not move against each other, and the start is half a standard deviation off.
+        let x = StoneVector::from_translation(Vector3::new(0.0, 0.0, 2e-4));
+        let [exactly, roughly] =
+            [FitOptions::EXACT, ROUGH].map(|options| equations(&pair, &x, &x, &NOISE, &layout, &options));
+        for epoch in 0..2 {
+            let share = roughly.points[epoch] as f64 / exactly.points[epoch] as f64;
+            assert!((0.3..0.7).contains(&share), "{share}");
+        }
+        // Half of the points: half the information out of the face.
+        for k in [2, 3, 4] {
+            let ratio = exactly.information[(k, k)] / roughly.information[(k, k)];
+            assert!((1.3..3.0).contains(&ratio), "{k}: {ratio}");
+        }
+        let error = |e: &Equations| {
+            let step = e.information.cholesky().unwrap().solve(&e.gradient);
+            let error = *x.unknowns() - step;
+            error.dot(&(e.information * error))
+        };
+        for square in [&exactly, &roughly].map(error) {
+            assert!(square < 25.0, "chi-square of 9: {square}");
+        }
+        assert_eq!(roughly.weights, PointWeights::NONE);
+    }
+
+    #[test]
+    fn the_gradient_of_the_determinant_is_all_that_small_faces_lack() {
+        let pair = scans(0.0);
+        let x = StoneVector::zeros();
+        let [exactly, roughly] =
+            [FitOptions::EXACT, ROUGH].map(|options| equations(&pair, &x, &x, &NOISE, &LAYOUT, &options));
+        assert_eq!(exactly.points, roughly.points);
+        assert_eq!(exactly.information, roughly.information);
+        assert_ne!(exactly.gradient, roughly.gradient);
+    }
+
+    #[test]
+    fn points_far_from_all_others_leave_the_equations_finite() {
+        let layout = Layout {
+            outlier_sigmas: 3.0,
+            ..LAYOUT
+        };
+        let pair = scans(0.0);
+        let unmoved = LocalMotion::new(&StoneVector::zeros());
+        let mut second: Vec<[f64; 3]> = pair.second_in(&unmoved).into_iter().map(|(_, q)| q).collect();
+        // A clump of leaves in front of the face, beyond the reach of the splines of the others.
+        second.extend((0..20).map(|k| [0.3, 0.001 * f64::from(k), 0.5 + 0.1 * f64::from(k % 2)]));
+        let mut first = pair.first.clone();
+        first.push([0.3, 0.0, 0.0]);
+        let pair = LocalPair::of_points(first, second);
+        let x = StoneVector::zeros();
+        let mut weights = PointWeights::NONE;
+        for _ in 0..4 {
+            let options = FitOptions {
+                weights: &weights,
+                ..FitOptions::EXACT
+            };
+            let e = equations(&pair, &x, &x, &NOISE, &layout, &options);
+            assert!(
+                e.gradient
+                    .iter()
+                    .chain(e.information.iter())
+                    .all(|v| v.is_finite())
+            );
+            weights = e.weights;
+        }
     }
 }

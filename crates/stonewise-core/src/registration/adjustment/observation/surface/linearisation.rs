@@ -1,6 +1,7 @@
 //! A stone's equations linearised at one of its motions, kept from iteration to iteration.
 
 use super::equations::Equations;
+use super::point_weights::PointWeights;
 use crate::registration::adjustment::observation::normal_equations::NormalEquations;
 use crate::registration::adjustment::stone_vector::StoneVector;
 
@@ -8,6 +9,9 @@ use crate::registration::adjustment::stone_vector::StoneVector;
 /// first eight iterations; from then on motions change by less than a window's border, and points that come
 /// and go would keep the iteration from settling.
 const CHOICES: usize = 11;
+/// Weights of points at one motion are a good start at another that is nearer than this, metres. Where it is farther
+/// away, points of one epoch may have counted as outliers of the other.
+const ALIKE_M: f64 = 1e-3;
 /// Distance of a stone's rim from its centroid, metres, at which rotation and bending are compared with
 /// translation: that of a block of 40 cm.
 const RIM_M: f64 = 0.2;
@@ -18,6 +22,8 @@ pub(crate) struct Linearisation {
     /// The motion with which the stone's window moved when points were last chosen.
     window: StoneVector,
     choices: usize,
+    /// Weights of the points at the last exact evaluation.
+    weights: PointWeights,
     /// The motion at which the equations were evaluated, and the equations.
     evaluated: Option<(StoneVector, Equations)>,
 }
@@ -28,6 +34,7 @@ impl Linearisation {
         Self {
             window: motion,
             choices: 0,
+            weights: PointWeights::NONE,
             evaluated: None,
         }
     }
@@ -35,6 +42,15 @@ impl Linearisation {
     /// The equations last computed.
     pub fn equations(&self) -> Option<&Equations> {
         self.evaluated.as_ref().map(|e| &e.1)
+    }
+
+    /// Weights with which the points start at the next evaluation, for the stone at `motion`.
+    pub fn weights(&self, motion: &StoneVector) -> &PointWeights {
+        static NONE: PointWeights = PointWeights::NONE;
+        match self.is_due(motion, ALIKE_M) {
+            true => &NONE,
+            false => &self.weights,
+        }
     }
 
     /// Whether the equations are missing or belong to a motion farther away than this, metres (of the
@@ -58,14 +74,16 @@ impl Linearisation {
     }
 
     /// Takes over equations that were evaluated at `motion`.
-    pub fn set(&mut self, motion: StoneVector, equations: Equations) {
+    pub fn set(&mut self, motion: StoneVector, mut equations: Equations) {
+        self.weights = std::mem::replace(&mut equations.weights, PointWeights::NONE);
         self.window = self.window(&motion);
         self.choices += 1;
         self.evaluated = Some((motion, equations));
     }
 
-    /// Forgets the equations: the noise they were evaluated with has changed.
+    /// Forgets the equations and the weights of the points: the noise they were evaluated with has changed.
     pub fn invalidate(&mut self) {
+        self.weights = PointWeights::NONE;
         self.evaluated = None;
     }
 
@@ -145,5 +163,21 @@ mod tests {
             linear.set(motion, without_points());
         }
         assert_eq!(linear.window(&at(99.0)), at((CHOICES - 1) as f64));
+    }
+
+    #[test]
+    fn weights_hold_near_the_motion_until_the_noise_changes() {
+        let weights = PointWeights::full([3, 2]);
+        let equations = Equations {
+            weights: weights.clone(),
+            ..without_points()
+        };
+        let mut linear = Linearisation::new(at(0.0));
+        assert_eq!(linear.weights(&at(0.0)), &PointWeights::NONE);
+        linear.set(at(0.0), equations);
+        assert_eq!(linear.weights(&at(0.0005)), &weights);
+        assert_eq!(linear.weights(&at(0.002)), &PointWeights::NONE);
+        linear.invalidate();
+        assert_eq!(linear.weights(&at(0.0)), &PointWeights::NONE);
     }
 }

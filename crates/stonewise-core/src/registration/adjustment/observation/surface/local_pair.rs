@@ -57,12 +57,17 @@ impl LocalPair {
         }
     }
 
+    /// Number of points of each epoch, in any window.
+    pub fn counts(&self) -> [usize; 2] {
+        [self.first.len(), self.second.len()]
+    }
+
     /// The points that count where the window moved by `window`, and no others: of the second epoch those in
     /// the window, of both those whose place in the first epoch `keep` takes.
     pub fn counting(&self, window: &StoneVector, keep: impl Fn(&[f64; 3]) -> bool) -> Self {
         let window = LocalMotion::new(window);
-        let mut second = self.second_in(&window);
-        second.retain(|q| keep(&window.undo(q)));
+        let second = self.second_in(&window).into_iter().map(|(_, q)| q);
+        let second: Vec<[f64; 3]> = second.filter(|q| keep(&window.undo(q))).collect();
         Self {
             first: self.first.iter().filter(|p| keep(p)).copied().collect(),
             labelled: second.len(),
@@ -72,8 +77,8 @@ impl LocalPair {
         }
     }
 
-    /// The second epoch's points in the window, where that moved by `window`.
-    pub fn second_in(&self, window: &LocalMotion) -> Vec<[f64; 3]> {
+    /// The second epoch's points in the window, where that moved by `window`, and their indices.
+    pub fn second_in(&self, window: &LocalMotion) -> Vec<(u32, [f64; 3])> {
         let counts = |(i, q): &(usize, &[f64; 3])| {
             self.window.as_ref().is_none_or(|(part, turn)| {
                 let at = turn * Vector3::from(window.undo(q));
@@ -81,7 +86,7 @@ impl LocalPair {
             })
         };
         let second = self.second.iter().enumerate().filter(counts);
-        second.map(|(_, q)| *q).collect()
+        second.map(|(i, q)| (i as u32, *q)).collect()
     }
 }
 
@@ -125,8 +130,15 @@ mod tests {
         };
         let local = LocalPair::new(&pair, &frame, NoiseFactors::USUAL);
         let moved = LocalMotion::new(&StoneVector::from_translation(frame * shift));
-        let counted: Vec<[f64; 3]> = local.second_in(&moved).iter().map(|q| moved.undo(q)).collect();
+        let counted: Vec<[f64; 3]> = local
+            .second_in(&moved)
+            .iter()
+            .map(|(_, q)| moved.undo(q))
+            .collect();
         assert_eq!(counted.len(), local.first.len());
+        for (i, q) in local.second_in(&moved) {
+            assert_eq!(local.second[i as usize], q);
+        }
         let largest = |points: &[[f64; 3]]| {
             points
                 .iter()

@@ -13,6 +13,7 @@ mod noise_estimate;
 mod patch_fit;
 mod patch_grid;
 mod patches;
+mod point_weights;
 mod robust;
 mod slope_scatter;
 mod stone_roughness;
@@ -22,12 +23,13 @@ mod testing;
 
 pub(crate) use correlation::Correlation;
 pub(crate) use discount::{with_error_likelihood, with_shift_error};
-pub(crate) use equations::{Equations, deviance};
+pub(crate) use equations::{Equations, FitOptions, deviance, equations};
 pub(crate) use layout::Layout;
 pub(crate) use linearisation::Linearisation;
 pub(crate) use local_pair::LocalPair;
-pub(crate) use model::{Inflation, StoneSurface, SurfaceModel};
+pub(crate) use model::{Effort, Inflation, StoneSurface, SurfaceModel};
 pub(crate) use noise_estimate::estimate_noise;
+pub(crate) use point_weights::PointWeights;
 pub(crate) use stone_roughness::likely_roughness;
 pub(crate) use surface_noise::{NoiseFactors, SurfaceNoise};
 #[cfg(test)]

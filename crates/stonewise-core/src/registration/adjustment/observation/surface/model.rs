@@ -2,25 +2,46 @@
 
 use super::correlation::{Correlation, shared_variance, stone_factor, stone_slope_factor};
 use super::discount::discounted;
-use super::equations::{Equations, equations};
+use super::equations::{Equations, FitOptions, equations};
 use super::layout::Layout;
 use super::linearisation::Linearisation;
 use super::local_pair::LocalPair;
+use super::point_weights::PointWeights;
 use super::surface_noise::SurfaceNoise;
 use crate::registration::adjustment::observation::normal_equations::NormalEquations;
 use crate::registration::adjustment::stone_vector::StoneVector;
 
-/// A stone is evaluated again once its equations, which are those of another motion, may be wrong by this,
-/// metres: a hundredth of the tolerance at which the adjustment has settled.
-const LINEAR_M: f64 = 1e-8;
 /// Lever by which an error that half a stone shares turns it, metres: that of a block of 40 cm.
 const HALF_STONE_M: f64 = 0.1;
+
+/// How exactly stones are evaluated, and how far they may move until they are evaluated again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Effort {
+    /// Approximately, see [`FitOptions::is_rough`]: noise and variance components change as well.
+    Aligning,
+    /// Exactly, again once the equations may be wrong by a micrometre, less than any standard deviation.
+    Weighing,
+    /// Exactly, again once the equations may be wrong by a hundredth of the tolerance at which the adjustment has
+    /// settled.
+    Settling,
+}
+
+impl Effort {
+    /// A stone is evaluated again once its equations, which are those of another motion, may be wrong by this, metres.
+    fn linear_m(self) -> f64 {
+        match self {
+            Self::Aligning | Self::Weighing => 1e-6,
+            Self::Settling => 1e-8,
+        }
+    }
+}
 
 /// How all stones' surfaces are observed.
 pub(crate) struct SurfaceModel {
     pub noise: SurfaceNoise,
     pub layout: Layout,
     pub correlation: Correlation,
+    pub effort: Effort,
 }
 
 /// The linearisations of one stone: moving with the field, and on its own where that is followed.
@@ -51,18 +72,29 @@ impl SurfaceModel {
             },
             layout,
             correlation: Correlation::NONE,
+            effort: Effort::Settling,
         }
     }
 
     /// Whether equations no longer hold at `motion`: they are quadratic, and their error grows with the
     /// square of the distance, in units of the surface's cells.
     pub fn is_due(&self, linearisation: &Linearisation, motion: &StoneVector) -> bool {
-        linearisation.is_due(motion, (LINEAR_M * self.layout.cell_m).sqrt())
+        linearisation.is_due(motion, (self.effort.linear_m() * self.layout.cell_m).sqrt())
     }
 
-    /// The equations of a stone at `motion`.
-    pub fn equations(&self, pair: &LocalPair, motion: &StoneVector, window: &StoneVector) -> Equations {
-        equations(pair, motion, window, &self.noise, &self.layout)
+    /// The equations of a stone at `motion`. `weights`: those with which the fits of its surface start.
+    pub fn equations(
+        &self,
+        pair: &LocalPair,
+        motion: &StoneVector,
+        window: &StoneVector,
+        weights: &PointWeights,
+    ) -> Equations {
+        let options = FitOptions {
+            is_rough: self.effort == Effort::Aligning,
+            weights,
+        };
+        equations(pair, motion, window, &self.noise, &self.layout, &options)
     }
 
     /// What a stone's points say as a quadratic about `origin`. `error_m`: error of the motion in the face

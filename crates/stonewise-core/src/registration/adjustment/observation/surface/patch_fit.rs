@@ -141,7 +141,7 @@ mod tests {
                 let (u, v) = (rng.random_range(0.0..0.10), rng.random_range(0.0..0.06));
                 WeightedPoint {
                     weight: rng.random_range(0.5..1.0),
-                    ..grid.point([u, v, height(u, v)])
+                    ..grid.point(0, [u, v, height(u, v)])
                 }
             })
             .collect()

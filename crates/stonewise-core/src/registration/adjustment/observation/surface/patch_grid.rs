@@ -17,6 +17,8 @@ const RIDGE: f64 = 1e-8;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WeightedPoint {
     pub position: [f64; 3],
+    /// Its place among the stone's points of its epoch.
+    pub index: u32,
     pub weight: f64,
     pub basis: Basis,
 }
@@ -83,9 +85,10 @@ impl PatchGrid {
     }
 
     /// A point with full weight.
-    pub fn point(&self, position: [f64; 3]) -> WeightedPoint {
+    pub fn point(&self, index: u32, position: [f64; 3]) -> WeightedPoint {
         WeightedPoint {
             position,
+            index,
             weight: 1.0,
             basis: self.basis(position[0], position[1]),
         }

@@ -6,7 +6,6 @@ use super::local_motion::{LocalMotion, Still};
 use super::local_pair::LocalPair;
 use super::patch_grid::{PatchGrid, WeightedPoint};
 use super::surface_noise::SurfaceNoise;
-use std::borrow::Cow;
 
 /// Points in each epoch that a patch needs: twice the unknowns of a plane, for a fit whose outliers can be detected.
 const PATCH_POINTS: usize = 12;
@@ -26,6 +25,8 @@ pub(crate) struct PatchPoints {
     pub epochs: [Vec<WeightedPoint>; 2],
     /// Roughness of the stone over that of most.
     pub roughness: f64,
+    /// Whether its column and row add to an odd number, as those of the dark squares of a chessboard.
+    pub is_dark: bool,
 }
 
 pub(crate) struct Patches {
@@ -49,10 +50,10 @@ pub(crate) fn pool_into_patches(
         true => Still::Second,
         false => Still::First,
     };
-    let mut first = Cow::Borrowed(&pair.first);
+    let mut first: Vec<(u32, [f64; 3])> = (0..).zip(pair.first.iter().copied()).collect();
     match still {
-        Still::First => second.iter_mut().for_each(|q| *q = motion.undo(q)),
-        Still::Second => first.to_mut().iter_mut().for_each(|p| *p = motion.apply(p)),
+        Still::First => second.iter_mut().for_each(|(_, q)| *q = motion.undo(q)),
+        Still::Second => first.iter_mut().for_each(|(_, p)| *p = motion.apply(p)),
     }
     let of_first = widened(&first, layout);
     let face = match still {
@@ -67,21 +68,24 @@ pub(crate) fn pool_into_patches(
         };
     };
     let cuts = Cuts::new(face, layout);
-    let mut list: Vec<PatchPoints> = (0..cuts.count[0] * cuts.count[1])
+    let count = cuts.count[0] * cuts.count[1];
+    let mut list: Vec<PatchPoints> = (0..count)
         .map(|patch| PatchPoints {
             grid: cuts.grid(patch, layout.cell_m),
-            epochs: [Vec::new(), Vec::new()],
+            // Patches in the middle of a face have more points than those at its rim.
+            epochs: [&first, &second].map(|points| Vec::with_capacity(3 * points.len() / (2 * count))),
             roughness: pair.noise.roughness,
+            is_dark: cuts.place(patch).iter().sum::<usize>() % 2 == 1,
         })
         .collect();
 
     let mut compare = CellSums::new(low, high, COMPARE_CELLS * layout.cell_m);
-    for (epoch, points) in [&*first, &second].into_iter().enumerate() {
-        for p in points {
+    for (epoch, points) in [&first, &second].into_iter().enumerate() {
+        for (i, p) in points {
             compare.count(epoch, p);
             if let Some(patch) = cuts.patch_at(p) {
                 let PatchPoints { grid, epochs, .. } = &mut list[patch];
-                epochs[epoch].push(grid.point(*p));
+                epochs[epoch].push(grid.point(*i, *p));
             }
         }
     }
@@ -95,11 +99,11 @@ pub(crate) fn pool_into_patches(
 }
 
 /// The corners of a face, widened; `None` without points.
-fn widened(face: &[[f64; 3]], layout: &Layout) -> Option<[[f64; 2]; 2]> {
+fn widened(face: &[(u32, [f64; 3])], layout: &Layout) -> Option<[[f64; 2]; 2]> {
     let margin = MARGIN_CELLS * layout.cell_m;
     let mut low = [f64::INFINITY; 2];
     let mut high = [f64::NEG_INFINITY; 2];
-    for p in face {
+    for (_, p) in face {
         for a in 0..2 {
             low[a] = low[a].min(p[a] - margin);
             high[a] = high[a].max(p[a] + margin);
@@ -127,6 +131,11 @@ impl Cuts {
         }
     }
 
+    /// Column and row of a patch.
+    fn place(&self, patch: usize) -> [usize; 2] {
+        [patch % self.count[0], patch / self.count[0]]
+    }
+
     fn patch_at(&self, p: &[f64; 3]) -> Option<usize> {
         let at = [0, 1].map(|a| ((p[a] - self.low[a]) / self.step[a]).floor());
         let is_inside = (0..2).all(|a| at[a] >= 0.0 && at[a] < self.count[a] as f64);
@@ -134,10 +143,8 @@ impl Cuts {
     }
 
     fn grid(&self, patch: usize, cell_m: f64) -> PatchGrid {
-        let corner = [
-            self.low[0] + (patch % self.count[0]) as f64 * self.step[0],
-            self.low[1] + (patch / self.count[0]) as f64 * self.step[1],
-        ];
+        let place = self.place(patch);
+        let corner = [0, 1].map(|a| self.low[a] + place[a] as f64 * self.step[a]);
         PatchGrid::new(
             corner,
             [corner[0] + self.step[0], corner[1] + self.step[1]],

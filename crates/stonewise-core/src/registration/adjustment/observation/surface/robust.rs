@@ -19,7 +19,8 @@ pub(crate) fn steepness([u, v]: [f64; 2]) -> f64 {
     1.0 / (1.0 + u * u + v * v)
 }
 
-/// Fits the surface; points on its steep parts and points far off it lose weight and it is fitted again.
+/// Fits the surface with the weights that the points have; points on its steep parts and points far off it lose weight
+/// and it is fitted again.
 ///
 /// The weights are those of the fit that is returned: with others, what the surface absorbs of the
 /// information could exceed it.
