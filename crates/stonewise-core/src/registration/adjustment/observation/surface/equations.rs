@@ -358,6 +358,11 @@ mod tests {
         outlier_sigmas: 1e9,
     };
 
+    const WITH_OUTLIERS: Layout = Layout {
+        outlier_sigmas: 3.0,
+        ..LAYOUT
+    };
+
     /// Two scans of a bumpy face; the second shows another part of it, `beside` metres farther along.
     fn scans(beside: f64) -> LocalPair {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
@@ -404,14 +409,11 @@ mod tests {
 
     #[test]
     fn no_information_is_negative_however_little_the_epochs_share() {
-        let layout = Layout {
-            outlier_sigmas: 3.0,
-            ..LAYOUT
-        };
         for beside in [0.05, 0.1, 0.15, 0.19, 0.3] {
             let pair = scans(beside);
             let x = StoneVector::zeros();
-            let information = equations(&pair, &x, &x, &NOISE, &layout, &FitOptions::EXACT).information;
+            let information =
+                equations(&pair, &x, &x, &NOISE, &WITH_OUTLIERS, &FitOptions::EXACT).information;
             let eigenvalues = information.symmetric_eigenvalues();
             let scale = information.diagonal().max();
             assert!(eigenvalues.min() >= -1e-9 * scale, "{beside}: {eigenvalues}");
@@ -464,20 +466,16 @@ mod tests {
 
     #[test]
     fn fits_from_stored_weights_say_what_fits_from_full_weights_say() {
-        let layout = Layout {
-            outlier_sigmas: 3.0,
-            ..LAYOUT
-        };
         let pair = scans_with_outliers();
         let x = StoneVector::zeros();
-        let before = equations(&pair, &x, &x, &NOISE, &layout, &FitOptions::EXACT);
+        let before = equations(&pair, &x, &x, &NOISE, &WITH_OUTLIERS, &FitOptions::EXACT);
         let x = StoneVector::from_translation(Vector3::new(1e-4, -1e-4, 1e-4));
-        let anew = equations(&pair, &x, &x, &NOISE, &layout, &FitOptions::EXACT);
+        let anew = equations(&pair, &x, &x, &NOISE, &WITH_OUTLIERS, &FitOptions::EXACT);
         let options = FitOptions {
             weights: &before.weights,
             ..FitOptions::EXACT
         };
-        let from_stored = equations(&pair, &x, &x, &NOISE, &layout, &options);
+        let from_stored = equations(&pair, &x, &x, &NOISE, &WITH_OUTLIERS, &options);
 
         let factor = anew.information.cholesky().unwrap();
         let apart = factor.solve(&(from_stored.gradient - anew.gradient));
@@ -492,15 +490,11 @@ mod tests {
 
     #[test]
     fn outliers_keep_their_small_weights() {
-        let layout = Layout {
-            outlier_sigmas: 3.0,
-            ..LAYOUT
-        };
         let pair = scans_with_outliers();
         let x = StoneVector::zeros();
-        let stored = equations(&pair, &x, &x, &NOISE, &layout, &FitOptions::EXACT).weights;
+        let stored = equations(&pair, &x, &x, &NOISE, &WITH_OUTLIERS, &FitOptions::EXACT).weights;
         let motion = LocalMotion::new(&x);
-        let mut patch = pool_into_patches(&pair, &motion, &motion, &NOISE, &layout)
+        let mut patch = pool_into_patches(&pair, &motion, &motion, &NOISE, &WITH_OUTLIERS)
             .list
             .remove(0);
         stored.apply(&mut patch.epochs);
@@ -560,10 +554,6 @@ mod tests {
 
     #[test]
     fn points_far_from_all_others_leave_the_equations_finite() {
-        let layout = Layout {
-            outlier_sigmas: 3.0,
-            ..LAYOUT
-        };
         let pair = scans(0.0);
         let unmoved = LocalMotion::new(&StoneVector::zeros());
         let mut second: Vec<[f64; 3]> = pair.second_in(&unmoved).into_iter().map(|(_, q)| q).collect();
@@ -579,7 +569,7 @@ mod tests {
                 weights: &weights,
                 ..FitOptions::EXACT
             };
-            let e = equations(&pair, &x, &x, &NOISE, &layout, &options);
+            let e = equations(&pair, &x, &x, &NOISE, &WITH_OUTLIERS, &options);
             assert!(
                 e.gradient
                     .iter()
