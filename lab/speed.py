@@ -2,7 +2,8 @@
 """Processor time of stonewise and of the programs that do the same, in turn and on the same data.
 
     cargo build --release -p stonewise-lab
-    python3 lab/speed.py                       # a made-up wall; pip install scipy open3d py4dgeo small_gicp laspy[lazrs]
+    pip install scipy open3d py4dgeo small_gicp laspy[lazrs,laszip]
+    python3 lab/speed.py                       # a made-up wall
     python3 lab/speed.py --clouds A.laz B.laz
 
 Prints a table in Markdown: medians of processor seconds (all threads) over the rounds, and their ratio. Peers that are not
@@ -43,8 +44,8 @@ def main():
     ours = Ours(arguments.program, folder)
     rows = []
     for what, case, their_case in cases(made_up=not arguments.clouds):
-        if case == "tiles" and not (folder / "first.laz").exists():
-            print("tiles: laspy, which writes LAZ, is not installed", flush=True)
+        if case in ("laz", "tiles") and not (folder / "first.laz").exists():
+            print(f"{case}: laspy, which writes LAZ, is not installed", flush=True)
             continue
         theirs = peers.of(their_case)
         times = {name: [] for name in ["stonewise", *theirs]}
@@ -75,6 +76,7 @@ def cases(made_up):
         yield "paper's estimator, 60 cm, all points", "gicp", "gicp"
         yield "the same, voxels of 1 cm", "gicp-voxel", "gicp"
         yield "label, units: points x photos", "label", None
+    yield "LAZ decoding", "laz", "laz"
     yield "LAZ to tiles", "tiles", "tiles"
 
 
@@ -182,6 +184,7 @@ class Peers:
             "c2c": {"scipy": self.scipy, "open3d": self.open3d, "CloudCompare": self.cloudcompare},
             "m3c2": {"py4dgeo": self.py4dgeo},
             "gicp": {"small_gicp": self.small_gicp},
+            "laz": {"laszip": lambda: self.decode("Laszip"), "lazrs": lambda: self.decode("Lazrs")},
             "tiles": {"laspy": self.laspy},
         }.get(case, {})
         return {name: run for name, run in peers.items() if is_there(name)}
@@ -239,6 +242,16 @@ class Peers:
             for s in self.stones
         ]
         return sum(timed(lambda: work(near)) for near in windows)
+
+    def decode(self, backend):
+        import laspy
+
+        # Coordinates of a million points at a time, as our reader gives them.
+        def work():
+            with laspy.open(self.folder / "first.laz", laz_backend=laspy.LazBackend[backend]) as reader:
+                return sum(len(np.column_stack([c.x, c.y, c.z])) for c in reader.chunk_iterator(1_000_000))
+
+        return timed(work)
 
     def laspy(self):
         import laspy

@@ -24,7 +24,7 @@ type Outcome = Result<(), Box<dyn std::error::Error>>;
 /// Name and start of a program.
 type Program = (&'static str, fn(&Words) -> Outcome);
 
-const PROGRAMS: [Program; 18] = [
+const PROGRAMS: [Program; 19] = [
     ("adjustment", adjustment::run),
     ("coverage", coverage::run),
     ("deformation", deformation::run),
@@ -40,6 +40,7 @@ const PROGRAMS: [Program; 18] = [
     ("training-crops", detector::training_crops::run),
     ("instances", detector::instances::run),
     ("comparisons", speed::comparisons::run),
+    ("machine", speed::machine::run),
     ("tiles", speed::tiles::run),
     ("clouds", speed::clouds::run),
     ("sample-report", sample_report::run),

@@ -2,6 +2,7 @@
 
 pub mod clouds;
 pub mod comparisons;
+pub mod machine;
 mod photos;
 pub mod series_time;
 mod survey;

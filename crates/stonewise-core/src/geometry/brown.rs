@@ -51,7 +51,7 @@ impl Brown {
     }
 
     /// The distorted place; `None` beyond [`Brown::max_radius`].
-    #[inline]
+    #[inline(always)]
     pub fn distort(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         let r2 = x * x + y * y;
         // Written so that a NaN is refused as well.
@@ -97,7 +97,7 @@ impl Brown {
         (converged && x.hypot(y) <= self.max_radius * (1.0 + 1e-12)).then_some([x, y])
     }
 
-    #[inline]
+    #[inline(always)]
     fn evaluate(&self, x: f64, y: f64, r2: f64) -> [f64; 2] {
         let [k1, k2, k3, k4] = self.radial;
         let [d1, d2, d3] = self.rational;

@@ -69,11 +69,17 @@ impl Camera {
         if self.near.is_some_and(|near| near.hides(point)) {
             return None;
         }
-        let [x, y] = self.distortion.distort([point.x / point.z, point.y / point.z])?;
-        Some([
+        let place = self.distortion.distort([point.x / point.z, point.y / point.z])?;
+        Some(self.pixel_of(place))
+    }
+
+    /// Pixel of a place in normalised, distorted coordinates.
+    #[inline(always)]
+    pub(crate) fn pixel_of(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [
             self.focal_px[0] * x + self.skew_px * y + self.center_px[0],
             self.focal_px[1] * y + self.center_px[1],
-        ])
+        ]
     }
 
     /// Ray through a pixel in the camera frame, scaled to z = 1; `None` where the lens shows nothing.
@@ -85,8 +91,9 @@ impl Camera {
     }
 
     /// Whether a pixel coordinate lies in the image.
-    #[inline]
+    #[inline(always)]
     pub fn is_inside(&self, [x, y]: [f64; 2]) -> bool {
-        x >= 0.0 && y >= 0.0 && x < f64::from(self.width) && y < f64::from(self.height)
+        // Without branches, for loops over many points.
+        (x >= 0.0) & (y >= 0.0) & (x < f64::from(self.width)) & (y < f64::from(self.height))
     }
 }

@@ -1,6 +1,7 @@
 //! Run-length masks as COCO stores them.
 
 use super::LabelImage;
+use std::ops::Range;
 
 /// A binary mask as alternating runs of outside and inside pixels, column by column, the first run outside.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,22 +98,28 @@ impl Rle {
         Self::from_counts(width, height, counts)
     }
 
-    /// The pixels of one label.
-    pub fn of_label(labels: &LabelImage, label: u32) -> Self {
+    /// The pixels of one label within these columns and rows, which must hold all of them. Cost: one look-up a
+    /// pixel there.
+    pub fn of_label(labels: &LabelImage, label: u32, columns: Range<u32>, rows: Range<u32>) -> Self {
         let (width, height) = (labels.width(), labels.height());
+        let columns = columns.start.min(width)..columns.end.min(width);
+        let rows = rows.start.min(height)..rows.end.min(height);
         let mut counts = vec![0u32];
-        let mut inside = false;
-        for x in 0..width {
-            for y in 0..height {
-                if (labels.get(x, y) == Some(&label)) != inside {
-                    inside = !inside;
-                    counts.push(0);
-                }
-                if let Some(last) = counts.last_mut() {
-                    *last += 1;
-                }
+        let mut add = |is_inside: bool, pixels: u32| {
+            let was_inside = counts.len().is_multiple_of(2);
+            match counts.last_mut() {
+                Some(last) if was_inside == is_inside || pixels == 0 => *last += pixels,
+                _ => counts.push(pixels),
             }
+        };
+        add(false, columns.start * height);
+        for x in columns.clone() {
+            add(false, rows.start);
+            rows.clone()
+                .for_each(|y| add(labels.get(x, y) == Some(&label), 1));
+            add(false, height - rows.end);
         }
+        add(false, (width - columns.end) * height);
         Self {
             width,
             height,

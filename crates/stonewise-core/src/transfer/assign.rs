@@ -110,7 +110,7 @@ fn solve(block: &[Edge]) -> Vec<(u32, u32)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::atoms::Atom;
+    use super::super::atoms::Atoms;
     use super::super::visibility::Sighting;
     use super::*;
 
@@ -136,11 +136,10 @@ mod tests {
             instance: 1,
             weight: 1.0,
         };
-        let atom = |area, photos: &[u32]| Atom {
-            area,
-            sightings: photos.iter().copied().map(sighting).collect(),
-        };
-        let atoms = [atom(common, &[0, 1]), atom(alone[0], &[0]), atom(alone[1], &[1])];
+        let mut atoms = Atoms::default();
+        for (area, photos) in [(common, &[0, 1][..]), (alone[0], &[0]), (alone[1], &[1])] {
+            atoms.push(photos.iter().copied().map(sighting), area);
+        }
         assign(&Overlaps::of(&atoms), 0.5)
     }
 

@@ -5,31 +5,82 @@ use super::visibility::{Observer, Sighting};
 use crate::cloud::{Cloud, TileSource};
 use crate::geometry::{CellMap, CellSet, cell_of};
 use crate::progress::Progress;
+use rayon::prelude::*;
 
 /// All sampled points that have the same sightings: the photos that see them, and the instance in each.
 ///
 /// The number of atoms follows the length of the mask borders, not the number of points; everything that must
 /// be decided about stones as a whole is decided on atoms.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Atom {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Atom<'a> {
     /// Sightings in the order of photos, each with the mean weight over the atom.
-    pub sightings: Vec<Sighting>,
+    pub sightings: &'a [Sighting],
     /// Number of sampled points: area in units of the sampling voxel's face.
     pub area: u32,
 }
 
-type Signature = Vec<(u32, u32)>;
+/// Atoms one after the other: 12 bytes a sighting and 12 an atom.
+#[derive(Default)]
+pub(super) struct Atoms {
+    sightings: Vec<Sighting>,
+    /// Where the sightings of each atom end.
+    ends: Vec<usize>,
+    areas: Vec<u32>,
+}
+
+impl Atoms {
+    pub(super) fn push(&mut self, sightings: impl IntoIterator<Item = Sighting>, area: u32) {
+        self.sightings.extend(sightings);
+        self.ends.push(self.sightings.len());
+        self.areas.push(area);
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = Atom<'_>> {
+        (0..self.areas.len()).map(|i| self.get(i))
+    }
+
+    fn get(&self, i: usize) -> Atom<'_> {
+        let start = i.checked_sub(1).map_or(0, |before| self.ends[before]);
+        Atom {
+            sightings: &self.sightings[start..self.ends[i]],
+            area: self.areas[i],
+        }
+    }
+
+    /// Joins those of equal sightings; the result ascends by them.
+    fn joined(self) -> Self {
+        let mut order: Vec<u32> = (0..self.areas.len() as u32).collect();
+        let atom = |i: &u32| self.get(*i as usize);
+        // A stable sort: sums run from cell to cell for any number of threads.
+        order.par_sort_by(|a, b| keys(atom(a).sightings).cmp(keys(atom(b).sightings)));
+        let mut joined = Self::default();
+        for equal in order.chunk_by(|a, b| keys(atom(a).sightings).eq(keys(atom(b).sightings))) {
+            let area: u32 = equal.iter().map(|i| atom(i).area).sum();
+            let mean = |(k, sighting): (usize, &Sighting)| {
+                let weighted = |i| f64::from(atom(i).area) * f64::from(atom(i).sightings[k].weight);
+                Sighting {
+                    weight: (equal.iter().map(weighted).sum::<f64>() / f64::from(area)) as f32,
+                    ..*sighting
+                }
+            };
+            joined.push(atom(&equal[0]).sightings.iter().enumerate().map(mean), area);
+        }
+        joined
+    }
+}
 
 /// Atoms of the whole cloud, thinned to one point a voxel, in ascending order of their sightings.
 ///
-/// Deterministic: the first point of a voxel in the tile's order is its sample, and sums run in that order.
+/// Deterministic: the first point of a voxel in the tile's order is its sample, and sums run in that order
+/// within each cell of the surface, then from cell to cell. Memory: the atoms of every cell, then the joined ones
+/// beside them.
 pub(super) fn gather_atoms<T: TileSource>(
     tiles: &T,
     observer: &Observer,
     sample_m: f64,
     progress: &dyn Progress,
-) -> Result<Vec<Atom>, TransferError> {
-    let mut sums: CellMap<Signature, (u32, Vec<f64>)> = CellMap::default();
+) -> Result<Atoms, TransferError> {
+    let mut parts = Atoms::default();
     progress.each(
         "sightings",
         0..tiles.tile_count(),
@@ -37,30 +88,15 @@ pub(super) fn gather_atoms<T: TileSource>(
             let candidates = observer.candidates(&tiles.bounds(tile));
             if !candidates.is_empty() {
                 let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
-                for sightings in sample(observer, tile, &cloud, &candidates, sample_m) {
-                    add(&mut sums, &sightings);
+                let chosen = thin(&cloud, sample_m);
+                for cell in observer.sight_cells(tile, &cloud, &chosen, &candidates, CellAtoms::add) {
+                    cell.finish(&mut parts);
                 }
             }
             Ok(())
         },
     )?;
-    let mut atoms: Vec<Atom> = sums.into_iter().map(finish).collect();
-    atoms.sort_unstable_by(|a, b| keys(a).cmp(keys(b)));
-    Ok(atoms)
-}
-
-/// Sightings of one point a voxel, without the points that no photo shows on a stone.
-fn sample(
-    observer: &Observer,
-    tile: usize,
-    cloud: &Cloud,
-    candidates: &[u32],
-    sample_m: f64,
-) -> Vec<Vec<Sighting>> {
-    let chosen = thin(cloud, sample_m);
-    let mut sightings = observer.sight_all(tile, cloud, &chosen, candidates, <[Sighting]>::to_vec);
-    sightings.retain(|found| found.iter().any(|s| s.instance != 0));
-    sightings
+    Ok(parts.joined())
 }
 
 /// The first point of every voxel of a world-aligned grid.
@@ -76,30 +112,70 @@ fn thin(cloud: &Cloud, voxel_m: f64) -> Vec<u32> {
         .collect()
 }
 
-fn add(sums: &mut CellMap<Signature, (u32, Vec<f64>)>, sightings: &[Sighting]) {
-    let signature = sightings.iter().map(|s| (s.photo, s.instance)).collect();
-    let (area, weights) = sums
-        .entry(signature)
-        .or_insert_with(|| (0, vec![0.0; sightings.len()]));
-    *area += 1;
-    for (sum, sighting) in weights.iter_mut().zip(sightings) {
-        *sum += f64::from(sighting.weight);
+/// Area, and the sum of the weights of each sighting.
+type Sums = (u32, Vec<f64>);
+
+/// The atoms of a cell of the surface while its points come in.
+#[derive(Default)]
+struct CellAtoms {
+    sums: CellMap<Vec<(u32, u32)>, Sums>,
+    /// Photos and instances of the last point.
+    keys: Vec<(u32, u32)>,
+}
+
+impl CellAtoms {
+    /// Adds a point, unless no photo shows it on a stone.
+    fn add(&mut self, _: u32, sightings: &[Sighting]) {
+        if sightings.iter().all(|s| s.instance == 0) {
+            return;
+        }
+        self.keys.clear();
+        self.keys.extend(keys(sightings));
+        if !self.sums.contains_key(&self.keys) {
+            self.sums
+                .insert(self.keys.clone(), (0, vec![0.0; sightings.len()]));
+        }
+        if let Some((area, sums)) = self.sums.get_mut(&self.keys) {
+            *area += 1;
+            for (sum, sighting) in sums.iter_mut().zip(sightings) {
+                *sum += f64::from(sighting.weight);
+            }
+        }
+    }
+
+    fn finish(self, atoms: &mut Atoms) {
+        for (keys, (area, sums)) in self.sums {
+            let mean = |(&(photo, instance), sum): (&(u32, u32), &f64)| Sighting {
+                photo,
+                instance,
+                weight: (sum / f64::from(area)) as f32,
+            };
+            atoms.push(keys.iter().zip(&sums).map(mean), area);
+        }
     }
 }
 
-fn finish((signature, (area, weights)): (Signature, (u32, Vec<f64>))) -> Atom {
-    let sightings = signature
-        .iter()
-        .zip(weights)
-        .map(|(&(photo, instance), sum)| Sighting {
-            photo,
-            instance,
-            weight: (sum / f64::from(area)) as f32,
-        })
-        .collect();
-    Atom { sightings, area }
+fn keys(sightings: &[Sighting]) -> impl Iterator<Item = (u32, u32)> {
+    sightings.iter().map(|s| (s.photo, s.instance))
 }
 
-fn keys(atom: &Atom) -> impl Iterator<Item = (u32, u32)> {
-    atom.sightings.iter().map(|s| (s.photo, s.instance))
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn atoms_of_equal_sightings_are_joined() {
+        let sighting = |instance, weight| Sighting {
+            photo: 0,
+            instance,
+            weight,
+        };
+        let mut parts = Atoms::default();
+        for (instance, weight, area) in [(2, 1.0, 1), (1, 4.0, 5), (2, 3.0, 3)] {
+            parts.push([sighting(instance, weight)], area);
+        }
+        let joined = parts.joined();
+        let found: Vec<_> = joined.iter().map(|a| (a.sightings.to_vec(), a.area)).collect();
+        assert_eq!(found, [(vec![sighting(1, 4.0)], 5), (vec![sighting(2, 2.5)], 4)]);
+    }
 }

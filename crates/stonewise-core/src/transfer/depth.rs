@@ -3,7 +3,7 @@
 use super::bytes::{Reader, Writer};
 use super::depth_bounds::DepthBounds;
 use super::frustum::Cone;
-use super::photo_frame::PhotoFrame;
+use super::photo_frame::{CHUNK, PhotoFrame, Shown, chunk_of};
 use super::surface_cells::{SurfaceCells, SurfaceGroup, limit_spacings};
 use super::{TransferError, TransferParams};
 use crate::cloud::{Cloud, TileSource};
@@ -205,13 +205,19 @@ fn splat_tile<'a>(
     params: &TransferParams,
 ) {
     let frame = PhotoFrame::of(view);
+    let mut shown = Shown::none();
+    let mut order: Vec<u32> = Vec::new();
     for group in groups {
         let width = params.splat_spacings * f64::from(group.surface.spacing_m) * frame.focal_px;
-        let leaps = (0..LEAP).flat_map(|first| group.points.iter().skip(first).step_by(LEAP));
-        for &i in leaps {
-            let point = frame.point(&cloud.world(i as usize));
-            if let Some(pixel) = frame.pixel(&point) {
-                map.splat(pixel, point.z, width / point.z);
+        order.clear();
+        order.extend((0..LEAP).flat_map(|first| group.points.iter().skip(first).step_by(LEAP)));
+        for points in order.chunks(CHUNK) {
+            frame.show(&chunk_of(cloud, points.iter().copied()), &mut shown);
+            for k in 0..points.len() {
+                if let Some(pixel) = shown.pixel(k) {
+                    let depth = shown.points[2][k];
+                    map.splat(pixel, depth, width / depth);
+                }
             }
         }
     }

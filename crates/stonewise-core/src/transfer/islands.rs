@@ -13,7 +13,8 @@ pub(super) type Voxel = [i64; 3];
 #[derive(Clone, Debug, PartialEq)]
 pub struct Occupancy {
     voxel_m: f64,
-    counts: CellMap<(u32, Voxel), u32>,
+    /// Points in each voxel of each stone.
+    counts: CellMap<u32, CellMap<Voxel, u32>>,
 }
 
 /// What must lose its label.
@@ -38,7 +39,7 @@ impl Occupancy {
         }
     }
 
-    /// Adds points with their stones. Runs of points in the same voxel take one look-up.
+    /// Adds points with their stones. Runs of points in the same voxel are counted together.
     pub(super) fn add_all(&mut self, points: impl Iterator<Item = (u32, Point3<f64>)>) {
         let mut last: Option<((u32, Voxel), u32)> = None;
         for (stone, world) in points {
@@ -55,15 +56,17 @@ impl Occupancy {
     }
 
     fn add(&mut self, counted: Option<((u32, Voxel), u32)>) {
-        if let Some((key, count)) = counted {
-            *self.counts.entry(key).or_insert(0) += count;
+        if let Some(((stone, voxel), count)) = counted {
+            *self.counts.entry(stone).or_default().entry(voxel).or_default() += count;
         }
     }
 
     /// The points of other tiles, too.
     pub fn merge(&mut self, other: Self) {
-        for counted in other.counts {
-            self.add(Some(counted));
+        for (stone, voxels) in other.counts {
+            for (voxel, count) in voxels {
+                self.add(Some(((stone, voxel), count)));
+            }
         }
     }
 
@@ -71,11 +74,14 @@ impl Occupancy {
     pub fn encode(&self) -> Vec<u8> {
         let mut out = Writer::default();
         out.f64(self.voxel_m);
-        let sorted: BTreeMap<&(u32, Voxel), &u32> = self.counts.iter().collect();
-        out.list(sorted.into_iter(), |out, ((stone, voxel), &count)| {
+        let stones: BTreeMap<_, _> = self.counts.iter().collect();
+        out.list(stones.into_iter(), |out, (stone, voxels)| {
             out.u32(*stone);
-            voxel.iter().for_each(|&v| out.i64(v));
-            out.u32(count);
+            let sorted: BTreeMap<_, _> = voxels.iter().collect();
+            out.list(sorted.into_iter(), |out, (voxel, count)| {
+                voxel.iter().for_each(|&v| out.i64(v));
+                out.u32(*count);
+            });
         });
         out.0
     }
@@ -89,8 +95,11 @@ impl Occupancy {
         let voxel_m = bytes.f64()?;
         let counts = bytes.list(|bytes| {
             let stone = bytes.u32()?;
-            let voxel = [bytes.i64()?, bytes.i64()?, bytes.i64()?];
-            Ok(((stone, voxel), bytes.u32()?))
+            let voxels = bytes.list(|bytes| {
+                let voxel = [bytes.i64()?, bytes.i64()?, bytes.i64()?];
+                Ok((voxel, bytes.u32()?))
+            })?;
+            Ok((stone, voxels.into_iter().collect()))
         })?;
         Ok(Self {
             voxel_m,
@@ -102,10 +111,6 @@ impl Occupancy {
     ///
     /// Parts hang together where their voxels touch, corners included.
     pub(super) fn removal(self, params: &TransferParams) -> Removal {
-        let mut stones: BTreeMap<u32, BTreeMap<Voxel, u32>> = BTreeMap::new();
-        for ((stone, voxel), count) in self.counts {
-            stones.entry(stone).or_default().insert(voxel, count);
-        }
         let mut removal = Removal {
             voxel_m: self.voxel_m,
             voxels: CellSet::default(),
@@ -113,8 +118,8 @@ impl Occupancy {
             stones: BTreeMap::new(),
             kept: BTreeSet::new(),
         };
-        for (stone, voxels) in stones {
-            removal.judge(stone, parts(voxels), params);
+        for (stone, voxels) in self.counts {
+            removal.judge(stone, parts(voxels.into_iter().collect()), params);
         }
         removal
     }
@@ -184,11 +189,19 @@ fn neighbours([x, y, z]: Voxel) -> impl Iterator<Item = Voxel> {
 mod tests {
     use super::*;
 
+    fn halved(voxels: &CellMap<Voxel, u32>, half: u32) -> CellMap<Voxel, u32> {
+        voxels.iter().map(|(voxel, n)| (*voxel, (n + half) / 2)).collect()
+    }
+
     /// Every voxel's points shared out between two.
     fn split(whole: &Occupancy) -> [Occupancy; 2] {
         [0, 1].map(|half| Occupancy {
             voxel_m: whole.voxel_m,
-            counts: whole.counts.iter().map(|(k, n)| (*k, (n + half) / 2)).collect(),
+            counts: whole
+                .counts
+                .iter()
+                .map(|(stone, voxels)| (*stone, halved(voxels, half)))
+                .collect(),
         })
     }
 

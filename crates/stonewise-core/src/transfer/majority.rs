@@ -1,7 +1,7 @@
 //! Merged and fragmented instances, decided by the majority of the photos that see their points.
 
 use super::TransferParams;
-use super::atoms::Atom;
+use super::atoms::{Atom, Atoms};
 use super::overlap::Overlaps;
 use super::visibility::Sighting;
 use super::vote::{Ballot, Electorate};
@@ -28,7 +28,7 @@ pub(super) enum Decision {
 pub(super) fn decide<'a>(
     overlaps: &'a Overlaps,
     groups: &[Vec<u32>],
-    atoms: &[Atom],
+    atoms: &Atoms,
     params: &TransferParams,
 ) -> (Electorate<'a>, BTreeMap<u32, Decision>) {
     let mut ballots = vec![Ballot::Nothing; overlaps.instances.len()];
@@ -76,7 +76,7 @@ struct Tables {
 }
 
 impl Tables {
-    fn count(electorate: &Electorate, overlaps: &Overlaps, atoms: &[Atom]) -> Self {
+    fn count(electorate: &Electorate, overlaps: &Overlaps, atoms: &Atoms) -> Self {
         let mut tables = Self {
             won: vec![BTreeMap::new(); overlaps.instances.len()],
             area: overlaps.instances.iter().map(|i| i.area).collect(),
@@ -84,12 +84,12 @@ impl Tables {
             support: BTreeMap::new(),
             photo: overlaps.instances.iter().map(|i| i.photo).collect(),
         };
-        for atom in atoms {
+        for atom in atoms.iter() {
             tables.count_support(electorate, overlaps, atom);
-            let Some(stone) = electorate.count(&atom.sightings).and_then(|v| v.stone) else {
+            let Some(stone) = electorate.count(atom.sightings).and_then(|v| v.stone) else {
                 continue;
             };
-            for s in &atom.sightings {
+            for s in atom.sightings {
                 *tables.seen.entry((stone, s.photo)).or_insert(0) += atom.area;
                 if let Some(i) = overlaps.find(s.photo, s.instance) {
                     *tables.won[i as usize].entry(stone).or_insert(0) += atom.area;
@@ -99,10 +99,10 @@ impl Tables {
         tables
     }
 
-    fn count_support(&mut self, electorate: &Electorate, overlaps: &Overlaps, atom: &Atom) {
+    fn count_support(&mut self, electorate: &Electorate, overlaps: &Overlaps, atom: Atom) {
         let weight = |s: &Sighting| f64::from(s.weight) * f64::from(atom.area);
         let mut votes: BTreeMap<u32, f64> = BTreeMap::new();
-        for s in &atom.sightings {
+        for s in atom.sightings {
             let ballot = overlaps
                 .find(s.photo, s.instance)
                 .map(|i| &electorate.ballots()[i as usize]);

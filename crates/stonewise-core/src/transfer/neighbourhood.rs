@@ -3,6 +3,7 @@
 use crate::cloud::sort_nearest;
 use crate::geometry::cells_between;
 use nalgebra::Point3;
+use std::f64::consts::PI;
 
 /// Indices of the points of a cell, ascending, and the cell.
 pub(super) type Members = ([i32; 3], Vec<u32>);
@@ -25,6 +26,26 @@ impl Neighbourhood<'_> {
     /// The `k` nearest points within `max_m` of a point of the cell, nearest first, the lower index first
     /// among equals, as (index, squared distance).
     pub(super) fn nearest_k(
+        &self,
+        cell: &[i32; 3],
+        centre: &Point3<f64>,
+        k: usize,
+        max_m: f64,
+    ) -> Vec<(usize, f64)> {
+        let inside = self.members.binary_search_by_key(cell, |m| m.0);
+        let count = inside.map_or(1, |at| self.members[at].1.len());
+        // On a face that fills the cell, about twice as many points as are sought lie within this distance.
+        let usual_m = self.cell_m * (2.0 * k as f64 / (PI * count as f64)).sqrt();
+        if usual_m < max_m {
+            let found = self.nearest_within(cell, centre, k, usual_m);
+            if found.len() >= k {
+                return found;
+            }
+        }
+        self.nearest_within(cell, centre, k, max_m)
+    }
+
+    fn nearest_within(
         &self,
         cell: &[i32; 3],
         centre: &Point3<f64>,

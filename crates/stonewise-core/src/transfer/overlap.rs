@@ -1,6 +1,6 @@
 //! How far the instances of different photos cover the same surface.
 
-use super::atoms::Atom;
+use super::atoms::{Atom, Atoms};
 use crate::geometry::CellMap;
 use std::collections::BTreeMap;
 
@@ -36,9 +36,9 @@ const SMALL_LABELS: u32 = 1 << 16;
 const NONE: u32 = u32::MAX;
 
 impl Overlaps {
-    pub(super) fn of(atoms: &[Atom]) -> Self {
+    pub(super) fn of(atoms: &Atoms) -> Self {
         let mut areas: BTreeMap<(u32, u32), u32> = BTreeMap::new();
-        for atom in atoms {
+        for atom in atoms.iter() {
             for s in atom.sightings.iter().filter(|s| s.instance != 0) {
                 *areas.entry((s.photo, s.instance)).or_insert(0) += atom.area;
             }
@@ -47,7 +47,7 @@ impl Overlaps {
             .into_iter()
             .map(|((photo, label), area)| Instance { photo, label, area });
         let mut overlaps = Self::of_instances(instances.collect());
-        for atom in atoms {
+        for atom in atoms.iter() {
             overlaps.count(atom);
         }
         overlaps
@@ -75,7 +75,7 @@ impl Overlaps {
         }
     }
 
-    fn count(&mut self, atom: &Atom) {
+    fn count(&mut self, atom: Atom) {
         for (k, a) in atom.sightings.iter().enumerate() {
             let Some(i) = self.find(a.photo, a.instance) else {
                 continue;

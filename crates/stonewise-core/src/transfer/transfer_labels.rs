@@ -335,18 +335,29 @@ fn label_tile(
     names: &Names,
 ) -> TileLabels {
     let all: Vec<u32> = (0..cloud.len() as u32).collect();
-    let verdicts = observer.sight_all(tile, cloud, &all, candidates, |found| {
-        let verdict = electorate.count(found);
-        verdict.map_or((0, 0.0, false), |v| {
-            let stone = v.stone.and_then(|s| names.id(s)).map_or(0, |id| id.0);
-            (stone, v.share as f32, true)
-        })
-    });
-    TileLabels {
-        stone: verdicts.iter().map(|v| v.0).collect(),
-        confidence: verdicts.iter().map(|v| v.1).collect(),
-        seen: verdicts.iter().map(|v| v.2).collect(),
+    let verdicts = observer.sight_cells(
+        tile,
+        cloud,
+        &all,
+        candidates,
+        |verdicts: &mut Vec<_>, i, found| {
+            if let Some(verdict) = electorate.count(found) {
+                let stone = verdict.stone.and_then(|s| names.id(s)).map_or(0, |id| id.0);
+                verdicts.push((i as usize, stone, verdict.share as f32));
+            }
+        },
+    );
+    let mut labels = TileLabels {
+        stone: vec![0; cloud.len()],
+        confidence: vec![0.0; cloud.len()],
+        seen: vec![false; cloud.len()],
+    };
+    for (i, stone, share) in verdicts.into_iter().flatten() {
+        labels.stone[i] = stone;
+        labels.confidence[i] = share;
+        labels.seen[i] = true;
     }
+    labels
 }
 
 /// Takes the label off islands and small stones, in the tiles that hold any.

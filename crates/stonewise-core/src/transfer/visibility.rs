@@ -5,13 +5,14 @@ use super::TransferParams;
 use super::depth::{SplatDepth, splat_all};
 use super::depth_bounds::DepthBounds;
 use super::frustum::Cone;
-use super::photo_frame::PhotoFrame;
+use super::photo_frame::{CHUNK, Chunk, PhotoFrame, Shown, chunk_of};
 use super::run_labels::RunLabels;
 use super::surface_cells::{LocalSurface, SurfaceCells, SurfaceGroup};
 use crate::cloud::{Cloud, TileSource};
 use crate::geometry::{Bounds, View};
 use crate::progress::Progress;
 use nalgebra::{Point3, Vector3};
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// One photo's word on one point.
@@ -115,42 +116,46 @@ impl<'a> Observer<'a> {
         all.get(all.len() / 2).copied().map_or(0.0, f64::from)
     }
 
-    /// What `judge` makes of the sightings of each chosen point of a tile by the candidate photos, in the
-    /// order of `chosen`.
+    /// For each cell of a tile's surface, what `note` makes of the sightings of its chosen points by the
+    /// candidate photos. `note` is given the place of a point in `chosen` and its sightings.
     ///
-    /// Points come cell by cell: their surface is looked up once, photos that cannot vote in the cell are
-    /// left out, and the others show its points side by side.
-    pub(super) fn sight_all<R: Clone + Default + Send>(
+    /// The surface of a cell is looked up once, photos that cannot vote in it are left out, and the others
+    /// show its points side by side.
+    pub(super) fn sight_cells<R: Default + Send>(
         &self,
         tile: usize,
         cloud: &Cloud,
         chosen: &[u32],
         candidates: &[u32],
-        judge: impl Fn(&[Sighting]) -> R + Sync,
+        note: impl Fn(&mut R, u32, &[Sighting]) + Sync,
     ) -> Vec<R> {
         let groups = self.surfaces[tile - self.first_tile].groups_of(cloud, chosen);
-        let judged: Vec<Vec<R>> = groups
-            .par_iter()
-            .map_init(Vec::new, |found, group| {
-                let may_vote = |p: &u32| self.may_vote(*p as usize, group);
-                let candidates = candidates.iter().copied().filter(may_vote);
-                let looks: Vec<Look> = candidates.map(|photo| self.look(photo, &group.surface)).collect();
-                let of_point = |&k: &u32| {
-                    let world = cloud.world(chosen[k as usize] as usize);
+        let of_group = |(seen, found): &mut (Vec<Seen>, Vec<Sighting>), group: &SurfaceGroup| {
+            let may_vote = |p: &u32| self.may_vote(*p as usize, group);
+            let candidates = candidates.iter().copied().filter(may_vote);
+            let looks: Vec<Look> = candidates.map(|photo| self.look(photo, &group.surface)).collect();
+            seen.resize_with(seen.len().max(looks.len()), Seen::none);
+            let mut noted = R::default();
+            for places in group.points.chunks(CHUNK) {
+                let points = places.iter().map(|&place| chosen[place as usize]);
+                let chunk = chunk_of(cloud, points);
+                for (look, seen) in looks.iter().zip(&mut *seen) {
+                    self.see(look, &chunk, seen);
+                }
+                for (k, &place) in places.iter().enumerate() {
                     found.clear();
-                    found.extend(looks.iter().filter_map(|look| self.sight(look, &world)));
-                    judge(&found[..])
-                };
-                group.points.iter().map(of_point).collect()
-            })
-            .collect();
-        let mut results = vec![R::default(); chosen.len()];
-        for (group, judged) in groups.iter().zip(judged) {
-            for (&k, result) in group.points.iter().zip(judged) {
-                results[k as usize] = result;
+                    found.extend(
+                        looks
+                            .iter()
+                            .zip(&*seen)
+                            .filter_map(|(look, seen)| self.sight(look, seen, k)),
+                    );
+                    note(&mut noted, place, &found[..]);
+                }
             }
-        }
-        results
+            noted
+        };
+        groups.par_iter().map_init(Default::default, of_group).collect()
     }
 
     /// False only where the photo shows no point of a cell, or all of them at too steep an incidence to vote.
@@ -179,19 +184,23 @@ impl<'a> Observer<'a> {
         }
     }
 
-    /// What a photo says about a point; what costs least and rules out most comes first.
+    /// Projects points into a photo, computes distances and incidences, and drops the points that are seen too
+    /// obliquely.
+    fn see(&self, look: &Look, world: &Chunk, seen: &mut Seen) {
+        self.frames[look.photo as usize].show(world, &mut seen.shown);
+        Arch::new().dispatch(Incidence {
+            seen,
+            normal: look.normal,
+            least_cosine: self.least_cosine,
+        });
+    }
+
+    /// The sighting of a point of a chunk; `None` where the photo does not show it.
     #[inline]
-    fn sight(&self, look: &Look, world: &Point3<f64>) -> Option<Sighting> {
+    fn sight(&self, look: &Look, seen: &Seen, k: usize) -> Option<Sighting> {
         let p = look.photo as usize;
-        let frame = &self.frames[p];
-        let point = frame.point(world);
-        let pixel = frame.pixel(&point)?;
-        let (depth, distance) = (point.z, point.coords.norm());
-        // Divided by the distance, this is the cosine of the incidence.
-        let across = look.normal.map_or(0.5 * distance, |n| n.dot(&point.coords).abs());
-        if across < self.least_cosine * distance {
-            return None;
-        }
+        let pixel = seen.shown.pixel(k)?;
+        let (depth, distance, across) = (seen.shown.points[2][k], seen.distance[k], seen.across[k]);
         // Most points lie on an even surface that fills their block of the depth map.
         let even = self.depths[p]
             .bounds_at(&self.bounds[p], pixel)
@@ -203,7 +212,7 @@ impl<'a> Observer<'a> {
         let instance = self.labels[p].at(pixel)?;
         // Precision of a border on the face: finer and less oblique photos place it more precisely. The
         // root keeps one close photo from outvoting the majority.
-        let precision = (across * frame.focal_px / (distance * depth)).sqrt();
+        let precision = (across * self.frames[p].focal_px / (distance * depth)).sqrt();
         let weight = if at_a_silhouette {
             precision * self.params.silhouette_weight
         } else {
@@ -238,6 +247,59 @@ struct Look<'a> {
     normal: Option<Vector3<f64>>,
     /// Depth tolerance of a point seen at a right angle, metres.
     least_tolerance_m: f64,
+}
+
+/// What a photo shows of the points of a chunk.
+struct Seen {
+    /// Without the points seen at too steep an incidence.
+    shown: Shown,
+    /// From the camera, metres.
+    distance: [f64; CHUNK],
+    /// Along the normal of the surface, metres. Divided by the distance, this is the cosine of the incidence.
+    across: [f64; CHUNK],
+}
+
+impl Seen {
+    fn none() -> Self {
+        Self {
+            shown: Shown::none(),
+            distance: [f64::NAN; CHUNK],
+            across: [f64::NAN; CHUNK],
+        }
+    }
+}
+
+/// Computes distances and incidences.
+struct Incidence<'a> {
+    seen: &'a mut Seen,
+    normal: Option<Vector3<f64>>,
+    least_cosine: f64,
+}
+
+impl WithSimd for Incidence<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Seen {
+            shown,
+            distance,
+            across,
+        } = self.seen;
+        let normal = self.normal.unwrap_or_default();
+        for k in 0..CHUNK {
+            let [x, y, z] = [shown.points[0][k], shown.points[1][k], shown.points[2][k]];
+            distance[k] = (x * x + y * y + z * z).sqrt();
+            let along_normal = (normal.x * x + normal.y * y + normal.z * z).abs();
+            across[k] = if self.normal.is_some() {
+                along_normal
+            } else {
+                0.5 * distance[k]
+            };
+            let is_steep = across[k] < self.least_cosine * distance[k];
+            shown.pixels[0][k] = if is_steep { f64::NAN } else { shown.pixels[0][k] };
+        }
+    }
 }
 
 #[cfg(test)]
@@ -279,6 +341,14 @@ mod tests {
             instance: observer.labels[photo].at(seen.pixel)?,
             weight: (share * (cosine / view.gsd_m(depth)).sqrt()) as f32,
         })
+    }
+
+    /// The sighting of a point that is alone in its chunk.
+    fn sight(observer: &Observer, look: &Look, world: &Point3<f64>) -> Option<Sighting> {
+        let mut seen = Seen::none();
+        let cloud = Cloud::from_world(*world, [*world]);
+        observer.see(look, &chunk_of(&cloud, 0..1), &mut seen);
+        observer.sight(look, &seen, 0)
     }
 
     /// A wall with recesses, a rail and a board before it, all in the depth maps, which some photos look at
@@ -331,20 +401,26 @@ mod tests {
                 .collect();
             let observer = Observer::new(&tiles, masked, &params, &crate::progress::Silent).unwrap();
             let (mut full, mut at_silhouettes, mut unseen) = (0, 0, 0);
+            let mut seen = Seen::none();
             for group in observer.surfaces[0].groups(&cloud) {
-                for (photo, &i) in (0..views.len()).flat_map(|p| group.points.iter().map(move |i| (p, i))) {
-                    let world = cloud.world(i as usize);
-                    let expected = sight_alone(&observer, photo, &group.surface, &world);
+                let chunks = || group.points.chunks(CHUNK);
+                for (photo, points) in (0..views.len()).flat_map(|p| chunks().map(move |points| (p, points)))
+                {
                     let look = observer.look(photo as u32, &group.surface);
-                    let found = observer.sight(&look, &world);
-                    let bare = |s: &Sighting| (s.photo, s.instance);
-                    assert_eq!(found.as_ref().map(bare), expected.as_ref().map(bare));
-                    if let (Some(found), Some(expected)) = (&found, &expected) {
-                        assert!((found.weight / expected.weight - 1.0).abs() < 1e-6);
-                        full += usize::from(found.weight > 1.0);
-                        at_silhouettes += usize::from(found.weight <= 1.0);
+                    observer.see(&look, &chunk_of(&cloud, points.iter().copied()), &mut seen);
+                    for (k, &i) in points.iter().enumerate() {
+                        let world = cloud.world(i as usize);
+                        let expected = sight_alone(&observer, photo, &group.surface, &world);
+                        let found = observer.sight(&look, &seen, k);
+                        let bare = |s: &Sighting| (s.photo, s.instance);
+                        assert_eq!(found.as_ref().map(bare), expected.as_ref().map(bare));
+                        if let (Some(found), Some(expected)) = (&found, &expected) {
+                            assert!((found.weight / expected.weight - 1.0).abs() < 1e-6);
+                            full += usize::from(found.weight > 1.0);
+                            at_silhouettes += usize::from(found.weight <= 1.0);
+                        }
+                        unseen += usize::from(found.is_none());
                     }
-                    unseen += usize::from(found.is_none());
                 }
             }
             let counts = [full, at_silhouettes, unseen];
@@ -393,9 +469,7 @@ mod tests {
             for photo in 0..views.len() {
                 let sees = |&i: &u32| {
                     let world = cloud.world(i as usize);
-                    observer
-                        .sight(&observer.look(photo as u32, &group.surface), &world)
-                        .is_some()
+                    sight(&observer, &observer.look(photo as u32, &group.surface), &world).is_some()
                 };
                 let some = group.points.iter().any(sees);
                 seen += usize::from(some);

@@ -72,6 +72,17 @@ impl<'a> Electorate<'a> {
         word < self.words && bits.is_some_and(|bits| bits >> (photo % 64) & 1 == 1)
     }
 
+    /// The stone for which every sighting votes with a weight above zero; most points on stones have one.
+    fn unanimous(&self, sightings: &[Sighting]) -> Option<u32> {
+        let vote = |s: &Sighting| match self.ballots[self.overlaps.find(s.photo, s.instance)? as usize] {
+            Ballot::One(stone) if s.weight > 0.0 => Some(stone),
+            _ => None,
+        };
+        let (first, others) = sightings.split_first()?;
+        let stone = vote(first)?;
+        others.iter().all(|s| vote(s) == Some(stone)).then_some(stone)
+    }
+
     /// Counts the votes at a point; `None` where no photo votes.
     ///
     /// Background counts against a stone only in photos that show the stone elsewhere, because only there a
@@ -79,6 +90,12 @@ impl<'a> Electorate<'a> {
     /// was accepted; here it only lowers the share. Between a stone and background a tie goes to the stone,
     /// between stones to the lower index.
     pub(super) fn count(&self, sightings: &[Sighting]) -> Option<Verdict> {
+        if let Some(stone) = self.unanimous(sightings) {
+            return Some(Verdict {
+                stone: Some(stone),
+                share: 1.0,
+            });
+        }
         let mut tally: Vec<(u32, f64)> = Vec::with_capacity(4);
         let mut total = 0.0;
         let mut undecided: Vec<(f64, &[u32])> = Vec::new();
@@ -152,4 +169,35 @@ fn leader<'t>(tally: impl Iterator<Item = &'t (u32, f64)>) -> Option<(u32, f64)>
             best
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::overlap::Instance;
+    use super::*;
+
+    #[test]
+    fn only_votes_that_count_and_agree_are_unanimous() {
+        let instance = |photo| Instance {
+            photo,
+            label: 1,
+            area: 1,
+        };
+        let overlaps = Overlaps::of_instances((0..3).map(instance).collect());
+        let ballots = vec![Ballot::One(4), Ballot::One(4), Ballot::One(5)];
+        let electorate = Electorate::new(&overlaps, ballots, 1.0);
+        let sighting = |(photo, instance, weight)| Sighting {
+            photo,
+            instance,
+            weight,
+        };
+        let count = |votes: [(u32, u32, f32); 2]| {
+            let verdict = electorate.count(&votes.map(sighting));
+            verdict.map(|v| (v.stone, v.share))
+        };
+        assert_eq!(count([(0, 1, 0.5), (1, 1, 2.0)]), Some((Some(4), 1.0)));
+        assert_eq!(count([(0, 1, 0.0), (1, 1, 0.0)]), None);
+        assert_eq!(count([(0, 1, 3.0), (2, 1, 1.0)]), Some((Some(4), 0.75)));
+        assert_eq!(count([(0, 1, 3.0), (1, 0, 1.0)]), Some((Some(4), 0.75)));
+    }
 }

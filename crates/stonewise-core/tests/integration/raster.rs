@@ -69,7 +69,14 @@ fn runs_agree_with_pycocotools() {
         let compressed = Rle::from_compressed(width, height, &case.compressed).unwrap();
         assert_eq!(plain, compressed);
         assert_eq!(from_runs(&plain), mask);
-        assert_eq!(Rle::of_label(&mask, 1), plain);
+        assert_eq!(Rle::of_label(&mask, 1, 0..width, 0..height), plain);
+        let inside = (0..width).flat_map(|x| (0..height).map(move |y| [x, y]));
+        let inside: Vec<[u32; 2]> = inside.filter(|&[x, y]| mask.get(x, y) == Some(&1)).collect();
+        let [columns, rows] = [0, 1].map(|a| {
+            let ends = inside.iter().map(|p| p[a]);
+            ends.clone().min().unwrap_or(0)..ends.max().map_or(0, |last| last + 1)
+        });
+        assert_eq!(Rle::of_label(&mask, 1, columns, rows), plain);
         assert_eq!(plain.to_compressed(), case.compressed);
         assert_eq!(
             plain.area(),

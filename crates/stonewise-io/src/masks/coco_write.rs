@@ -87,7 +87,8 @@ fn annotation(labels: &LabelImage, label: u32, rings: &[Ring]) -> Value {
     let high = |axis: usize| vertices().map(|v| v[axis]).fold(f64::NEG_INFINITY, f64::max);
     let has_hole = rings.iter().any(|ring| ring_area(ring) < 0.0);
     let segmentation = if has_hole {
-        let counts = Rle::of_label(labels, label).to_compressed();
+        let [columns, rows] = [0, 1].map(|axis| low(axis) as u32..high(axis) as u32);
+        let counts = Rle::of_label(labels, label, columns, rows).to_compressed();
         json!({ "size": [labels.height(), labels.width()], "counts": counts })
     } else {
         json!(rings.iter().map(|ring| ring.as_flattened()).collect::<Vec<_>>())

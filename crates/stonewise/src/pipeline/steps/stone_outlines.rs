@@ -6,11 +6,11 @@ use crate::pipeline::steps::label::Labelled;
 use crate::results::{StoneOutline, write_outlines};
 use crate::storage::step::{Key, StepDir};
 use crate::storage::store::Name;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::geometry::{OutlineParams, face_outline};
-use stonewise_core::stone::Stone;
 
 /// Makes the outlines of the reference's stones in a step of this name; those of the same labels once.
 pub fn make_outlines(context: &Context, first: &Labelled, name: &str) -> Result<StepDir> {
@@ -24,26 +24,43 @@ pub fn make_outlines(context: &Context, first: &Labelled, name: &str) -> Result<
     })
 }
 
-/// The outlines of an epoch's stones. Cost: one pass over all tiles; memory holds the points of the stones.
+/// The outlines of an epoch's stones. Cost: one pass over all tiles and one more over their labels; memory holds
+/// the points of the stones that further tiles continue.
 pub fn stone_outlines(context: &Context, first: &Labelled) -> Result<Vec<StoneOutline>> {
-    let mut points: BTreeMap<u32, Vec<Point3<f64>>> = BTreeMap::new();
     let tiles = &first.ingested.tiles;
+    let mut last_tiles: BTreeMap<u32, usize> = BTreeMap::new();
+    for tile in 0..tiles.tile_count() {
+        context.progress.check()?;
+        let mut stones = first.labels(tile)?.stone;
+        stones.sort_unstable();
+        stones.dedup();
+        last_tiles.extend(stones.into_iter().map(|stone| (stone, tile)));
+    }
+    let normals: BTreeMap<u32, Vector3<f64>> = first.stones.iter().map(|s| (s.id.0, s.normal)).collect();
+    let mut points: BTreeMap<u32, Vec<Point3<f64>>> = BTreeMap::new();
+    let mut outlines: BTreeMap<u32, StoneOutline> = BTreeMap::new();
     let all = 0..tiles.tile_count();
     context.progress.each("outlines", all, |tile| -> Result<()> {
         let (cloud, labels) = (tiles.load(tile)?, first.labels(tile)?);
         for (i, &stone) in labels.stone.iter().enumerate().filter(|(_, s)| **s != 0) {
             points.entry(stone).or_default().push(cloud.world(i));
         }
+        let complete: Vec<_> = points
+            .extract_if(.., |stone, _| last_tiles.get(stone) == Some(&tile))
+            .collect();
+        outlines.par_extend(complete.into_par_iter().filter_map(|(stone_id, points)| {
+            let normal = *normals.get(&stone_id)?;
+            let ring = face_outline(&points, &normal, &OutlineParams::default())?;
+            Some((
+                stone_id,
+                StoneOutline {
+                    stone_id,
+                    normal,
+                    ring,
+                },
+            ))
+        }));
         Ok(())
     })?;
-    let params = OutlineParams::default();
-    let outline = |stone: &Stone| {
-        let ring = face_outline(points.get(&stone.id.0)?, &stone.normal, &params)?;
-        Some(StoneOutline {
-            stone_id: stone.id.0,
-            normal: stone.normal,
-            ring,
-        })
-    };
-    Ok(first.stones.iter().filter_map(outline).collect())
+    Ok(outlines.into_values().collect())
 }
