@@ -1,5 +1,7 @@
 //! How long work reports its progress to its caller, and how the caller stops it.
 
+use rayon::prelude::*;
+
 /// The work was stopped by the caller before it was done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("interrupted")]
@@ -61,6 +63,37 @@ impl dyn Progress + '_ {
             self.check()?;
             work(item)?;
             self.advance(1);
+        }
+        Ok(())
+    }
+
+    /// Does a piece of work item by item, in two parts: prepares as many items at a time as there are threads, then
+    /// takes what was prepared one after the other, in order, as [`Self::each`] does. Memory: the prepared items.
+    ///
+    /// # Errors
+    /// The work on an item failed, or the caller stopped it.
+    pub fn each_prepared<I, T, E>(
+        &self,
+        what: &str,
+        items: I,
+        prepare: impl Fn(I::Item) -> Result<T, E> + Sync,
+        mut take: impl FnMut(I::Item, T) -> Result<(), E>,
+    ) -> Result<(), E>
+    where
+        I: IntoIterator<Item: Copy + Send + Sync>,
+        T: Send,
+        E: From<Interrupted> + Send,
+    {
+        let items: Vec<I::Item> = items.into_iter().collect();
+        self.begin(what, items.len() as u64);
+        for group in items.chunks(rayon::current_num_threads()) {
+            self.check()?;
+            let prepared = group.par_iter().map(|item| prepare(*item));
+            for (item, prepared) in group.iter().zip(prepared.collect::<Result<Vec<T>, E>>()?) {
+                self.check()?;
+                take(*item, prepared)?;
+                self.advance(1);
+            }
         }
         Ok(())
     }

@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 use stonewise::Settings;
 use stonewise::results::{Reference, StoneRow, stone_table};
 use stonewise_core::cloud::{Cloud, TileSource};
-use stonewise_core::geometry::{Camera, Plane, View, cell_of};
+use stonewise_core::geometry::{Camera, Plane, View, cell_of, cells_around};
 use stonewise_core::id::{ImageId, StoneId};
 use stonewise_core::matching::{Footprints, MatchReport, Surroundings, footprint_overlap, match_stones};
 use stonewise_core::progress::{Interrupted, Progress};
@@ -149,10 +149,7 @@ impl Epoch {
         let (_, footprints) = self.coverage();
         let (covered, footprints_2) = second.coverage();
         let overlap = footprint_overlap(&footprints, &footprints_2);
-        let sees = |p: &Point3<f64>| {
-            let [x, y, z] = cell_of(p, COVERAGE_CELL_M);
-            (0..27i64).any(|i| covered.contains(&[x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1]))
-        };
+        let sees = |p: &Point3<f64>| cells_around(cell_of(p, COVERAGE_CELL_M)).any(|c| covered.contains(&c));
         let surroundings = Surroundings {
             covered: &sees,
             overlap: Some(&overlap),

@@ -3,6 +3,7 @@
 use nalgebra::Point3;
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
+use std::ops::Add;
 
 /// The cell that holds a point, by its lowest corner in cells of `size_m`; points on a border belong to the
 /// upper cell.
@@ -15,6 +16,13 @@ pub fn cell_of(point: &Point3<f64>, size_m: f64) -> [i64; 3] {
 pub fn cells_between(low: [i64; 3], high: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {
     (low[0]..=high[0])
         .flat_map(move |x| (low[1]..=high[1]).flat_map(move |y| (low[2]..=high[2]).map(move |z| [x, y, z])))
+}
+
+/// A cell and the 26 that touch it, in ascending order.
+#[inline]
+pub fn cells_around<T: Copy + Add<Output = T> + From<i8>>([x, y, z]: [T; 3]) -> impl Iterator<Item = [T; 3]> {
+    let beside = |coordinate: T, step: i8| coordinate + T::from(step % 3 - 1);
+    (0..27i8).map(move |i| [beside(x, i / 9), beside(y, i / 3), beside(z, i)])
 }
 
 /// The largest whole number that is not above `value`; without the call that `f64::floor` is on processors of

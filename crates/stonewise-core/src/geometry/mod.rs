@@ -22,7 +22,7 @@ mod view;
 pub use bounds::Bounds;
 pub use brown::Brown;
 pub use camera::{Camera, NearPlane};
-pub use cell::{CellHasher, CellMap, CellSet, cell_of, cells_between, floor};
+pub use cell::{CellHasher, CellMap, CellSet, cell_of, cells_around, cells_between, floor};
 pub use distortion::Distortion;
 pub use face_frame::FaceFrame;
 pub use moments::Moments;

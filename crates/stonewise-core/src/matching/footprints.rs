@@ -1,6 +1,6 @@
 //! Where the stones of an epoch lie, coarsely, as a third criterion beside centroids and areas.
 
-use crate::geometry::{CellMap, floor};
+use crate::geometry::{CellMap, cells_around, floor};
 use crate::id::StoneId;
 use crate::stone::Stone;
 use nalgebra::{Point3, Vector3};
@@ -107,11 +107,9 @@ fn voxel_of(p: &Point3<f64>) -> Voxel {
 }
 
 /// A voxel, then the 26 around it: the first mostly holds the stone that is sought.
-fn neighbours([x, y, z]: Voxel) -> impl Iterator<Item = Voxel> {
-    let beside = (0..27).filter(|i| *i != 13);
-    std::iter::once(13)
-        .chain(beside)
-        .map(move |i| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1])
+fn neighbours(voxel: Voxel) -> impl Iterator<Item = Voxel> {
+    let beside = cells_around(voxel).filter(move |v| *v != voxel);
+    std::iter::once(voxel).chain(beside)
 }
 
 /// The block of a voxel, and the voxel's bit in it.

@@ -3,6 +3,7 @@
 use super::MatchParams;
 use super::centroids::{Centroids, area_ratio};
 use super::field::{Field, grow};
+use crate::geometry::cells_around;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, HashMap};
 
@@ -61,11 +62,7 @@ fn peaks(votes: &[Vector3<f64>], scale: f64) -> Vec<Vector3<f64>> {
     for vote in votes {
         *cells.entry(key(vote)).or_insert(0) += 1;
     }
-    let block = |[x, y, z]: [i32; 3]| -> u32 {
-        (0..27)
-            .filter_map(|i| cells.get(&[x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1]))
-            .sum()
-    };
+    let block = |cell| -> u32 { cells_around(cell).filter_map(|c| cells.get(&c)).sum() };
     let ranked: BTreeMap<(std::cmp::Reverse<u32>, [i32; 3]), ()> = cells
         .keys()
         .map(|&cell| ((std::cmp::Reverse(block(cell)), cell), ()))

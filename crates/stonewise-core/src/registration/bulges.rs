@@ -1,6 +1,6 @@
 //! Bulges of every place and size: which stones take part in each, and by how much.
 
-use crate::geometry::Bounds;
+use crate::geometry::{Bounds, cells_around};
 use nalgebra::Point3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -86,9 +86,7 @@ impl Cells {
 
     /// The stones in the cube of a place and in those that touch it: all within the side, and some beyond.
     fn around(&self, place: &Point3<f64>) -> impl Iterator<Item = usize> + '_ {
-        let [x, y, z] = Self::key(self.side_m, place);
-        let keys = (-1..=1)
-            .flat_map(move |a| (-1..=1).flat_map(move |b| (-1..=1).map(move |c| [x + a, y + b, z + c])));
+        let keys = cells_around(Self::key(self.side_m, place));
         keys.filter_map(|key| self.cells.get(&key)).flatten().copied()
     }
 }

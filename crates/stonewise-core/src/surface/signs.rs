@@ -1,7 +1,7 @@
 //! Consistent signs of normals over a surface.
 
 use super::SurfaceCell;
-use crate::geometry::{CellMap, cells_between};
+use crate::geometry::{CellMap, cells_around};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap};
 
@@ -126,8 +126,7 @@ pub(super) fn neighbours(cells: &[SurfaceCell]) -> Vec<Vec<usize>> {
         at.entry(cell.cell).or_default().push(i);
     }
     let around = |(i, cell): (usize, &SurfaceCell)| {
-        let [low, high] = [-1, 1].map(|step| cell.cell.map(|c| c + step));
-        let found = cells_between(low, high).flat_map(|key| at.get(&key).into_iter().flatten().copied());
+        let found = cells_around(cell.cell).flat_map(|key| at.get(&key).into_iter().flatten().copied());
         found.filter(|j| *j != i).collect()
     };
     cells.iter().enumerate().map(around).collect()

@@ -35,6 +35,13 @@ impl Atoms {
         self.areas.push(area);
     }
 
+    fn append(&mut self, others: &Self) {
+        let before = self.sightings.len();
+        self.sightings.extend_from_slice(&others.sightings);
+        self.ends.extend(others.ends.iter().map(|end| before + end));
+        self.areas.extend_from_slice(&others.areas);
+    }
+
     pub(super) fn iter(&self) -> impl Iterator<Item = Atom<'_>> {
         (0..self.areas.len()).map(|i| self.get(i))
     }
@@ -72,8 +79,8 @@ impl Atoms {
 /// Atoms of the whole cloud, thinned to one point a voxel, in ascending order of their sightings.
 ///
 /// Deterministic: the first point of a voxel in the tile's order is its sample, and sums run in that order
-/// within each cell of the surface, then from cell to cell. Memory: the atoms of every cell, then the joined ones
-/// beside them.
+/// within each cell of the surface, then from cell to cell of a tile, then from tile to tile. Memory: the atoms of
+/// every tile, then the joined ones beside them.
 pub(super) fn gather_atoms<T: TileSource>(
     tiles: &T,
     observer: &Observer,
@@ -81,21 +88,25 @@ pub(super) fn gather_atoms<T: TileSource>(
     progress: &dyn Progress,
 ) -> Result<Atoms, TransferError> {
     let mut parts = Atoms::default();
-    progress.each(
-        "sightings",
-        0..tiles.tile_count(),
-        |tile| -> Result<(), TransferError> {
-            let candidates = observer.candidates(&tiles.bounds(tile));
-            if !candidates.is_empty() {
-                let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
-                let chosen = thin(&cloud, sample_m);
-                for cell in observer.sight_cells(tile, &cloud, &chosen, &candidates, CellAtoms::add) {
-                    cell.finish(&mut parts);
-                }
+    let load = |tile| -> Result<_, TransferError> {
+        let candidates = observer.candidates(&tiles.bounds(tile));
+        if candidates.is_empty() {
+            return Ok(None);
+        }
+        let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
+        let chosen = thin(&cloud, sample_m);
+        Ok(Some((cloud, chosen, candidates)))
+    };
+    progress.each_prepared("sightings", 0..tiles.tile_count(), load, |tile, loaded| {
+        if let Some((cloud, chosen, candidates)) = loaded {
+            let mut in_tile = Atoms::default();
+            for cell in observer.sight_cells(tile, &cloud, &chosen, &candidates, CellAtoms::add) {
+                cell.finish(&mut in_tile);
             }
-            Ok(())
-        },
-    )?;
+            parts.append(&in_tile.joined());
+        }
+        Ok(())
+    })?;
     Ok(parts.joined())
 }
 
@@ -131,14 +142,16 @@ impl CellAtoms {
         }
         self.keys.clear();
         self.keys.extend(keys(sightings));
-        if !self.sums.contains_key(&self.keys) {
-            self.sums
-                .insert(self.keys.clone(), (0, vec![0.0; sightings.len()]));
-        }
-        if let Some((area, sums)) = self.sums.get_mut(&self.keys) {
-            *area += 1;
-            for (sum, sighting) in sums.iter_mut().zip(sightings) {
-                *sum += f64::from(sighting.weight);
+        let weights = sightings.iter().map(|s| f64::from(s.weight));
+        match self.sums.get_mut(&self.keys) {
+            Some((area, sums)) => {
+                *area += 1;
+                sums.iter_mut()
+                    .zip(weights)
+                    .for_each(|(sum, weight)| *sum += weight);
+            }
+            None => {
+                self.sums.insert(self.keys.clone(), (1, weights.collect()));
             }
         }
     }

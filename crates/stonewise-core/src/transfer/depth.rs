@@ -169,21 +169,18 @@ pub(super) fn splat_all<T: TileSource>(
     let mut maps: Vec<SplatDepth> = views.iter().map(|v| SplatDepth::new(v, scale)).collect();
     let cones: Vec<Cone> = views.iter().map(|v| Cone::of(v)).collect();
     let mut surfaces = Vec::with_capacity(tiles.tile_count());
-    progress.begin("depth maps", 2 * tiles.tile_count() as u64);
+    let load = |tile| tiles.load(tile).map_err(|e| TransferError::tile(tile, e));
 
-    for tile in 0..tiles.tile_count() {
-        progress.check()?;
-        let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
+    let all = 0..tiles.tile_count();
+    progress.each_prepared("surface", all.clone(), load, |_, cloud| {
         surfaces.push(SurfaceCells::new(&cloud, params.cell_m));
-        progress.advance(1);
-    }
+        Ok(())
+    })?;
 
     limit_spacings(&mut surfaces);
-    for (tile, surface) in surfaces.iter().enumerate() {
-        progress.check()?;
-        let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
+    progress.each_prepared("depth maps", all, load, |tile, cloud| {
         let bounds = tiles.bounds(tile);
-        let groups = surface.groups(&cloud);
+        let groups = surfaces[tile].groups(&cloud);
         maps.par_iter_mut()
             .zip(views.par_iter().zip(&cones))
             .filter(|(_, (_, cone))| cone.touches(&bounds))
@@ -191,8 +188,8 @@ pub(super) fn splat_all<T: TileSource>(
                 let groups = groups.iter().filter(|g| cone.touches(&g.bounds));
                 splat_tile(map, view, &cloud, groups, params);
             });
-        progress.advance(1);
-    }
+        Ok(())
+    })?;
 
     Ok((maps, surfaces))
 }

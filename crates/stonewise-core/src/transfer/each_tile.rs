@@ -15,7 +15,7 @@ pub(super) fn each_tile<T: TileSource, S: LabelStore>(
     progress: &dyn Progress,
     mut visit: impl FnMut(usize, &Cloud, &TileLabels),
 ) -> Result<(), TransferError> {
-    progress.each(what, 0..tiles.tile_count(), |tile| {
+    let load = |tile| {
         let labels = store.read(tile).map_err(|e| TransferError::labels(tile, e))?;
         let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
         let count = labels.stone.len().min(labels.confidence.len());
@@ -26,6 +26,9 @@ pub(super) fn each_tile<T: TileSource, S: LabelStore>(
                 labels: count,
             });
         }
+        Ok((cloud, labels))
+    };
+    progress.each_prepared(what, 0..tiles.tile_count(), load, |tile, (cloud, labels)| {
         visit(tile, &cloud, &labels);
         Ok(())
     })

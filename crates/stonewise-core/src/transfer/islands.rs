@@ -2,7 +2,7 @@
 
 use super::bytes::{Reader, Writer};
 use super::{TransferError, TransferParams};
-use crate::geometry::{CellMap, CellSet, cell_of};
+use crate::geometry::{CellMap, CellSet, cell_of, cells_around};
 use nalgebra::Point3;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -169,7 +169,7 @@ fn parts(mut voxels: BTreeMap<Voxel, u32>) -> Vec<Part> {
         while next < part.0.len() {
             let v = part.0[next];
             next += 1;
-            for n in neighbours(v) {
+            for n in cells_around(v) {
                 if let Some(count) = voxels.remove(&n) {
                     part.0.push(n);
                     part.1 += u64::from(count);
@@ -179,10 +179,6 @@ fn parts(mut voxels: BTreeMap<Voxel, u32>) -> Vec<Part> {
         parts.push(part);
     }
     parts
-}
-
-fn neighbours([x, y, z]: Voxel) -> impl Iterator<Item = Voxel> {
-    (0..27i64).map(move |i| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1])
 }
 
 #[cfg(test)]

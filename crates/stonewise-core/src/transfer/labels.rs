@@ -12,7 +12,7 @@ pub struct TileLabels {
 }
 
 /// Keeps the labels of each tile and gives them back: files in a survey, memory in tests.
-pub trait LabelStore {
+pub trait LabelStore: Sync {
     /// Why labels could not be kept or found.
     type Error: std::error::Error + Send + Sync + 'static;
 

@@ -254,8 +254,8 @@ impl<'a> PreparedTransfer<'a> {
         let names = Names::of(&electorate, &self.election.overlaps, self.observer.views());
         let link_m = self.params.island_link_m.max(3.0 * self.election.spacing_m);
         let mut occupancy = Occupancy::new(link_m);
-        progress.each("labels", range, |tile| {
-            let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
+        let load = |tile| tiles.load(tile).map_err(|e| TransferError::tile(tile, e));
+        progress.each_prepared("labels", range, load, |tile, cloud| {
             let candidates = self.observer.candidates(&tiles.bounds(tile));
             let labels = label_tile(tile, &cloud, &self.observer, &candidates, &electorate, &names);
             let labelled = labels.stone.iter().enumerate().filter(|s| *s.1 != 0);

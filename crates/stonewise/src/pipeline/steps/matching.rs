@@ -9,11 +9,12 @@ use crate::storage::step::Key;
 use crate::storage::store::Name;
 use nalgebra::Point3;
 use std::sync::Arc;
-use stonewise_core::cloud::TileSource;
+use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::epoch::{EpochId, Pair};
-use stonewise_core::geometry::{CellSet, cell_of};
+use stonewise_core::geometry::{CellSet, cell_of, cells_around};
 use stonewise_core::id::StoneId;
 use stonewise_core::matching::{Footprints, MatchReport, Surroundings, footprint_overlap, match_stones};
+use stonewise_core::transfer::TileLabels;
 
 /// Edge of the cells in which the second epoch's coverage is noted, metres: about half a stone.
 const COVERAGE_CELL_M: f64 = 0.1;
@@ -38,7 +39,7 @@ fn find(context: &Context, name: Name, key: Key, labelled: Pair<&Labelled>) -> R
         let (covered, footprints_2) = survey(context, labelled.later)?;
         let overlap = footprint_overlap(&footprints, &footprints_2);
         let sees =
-            |p: &Point3<f64>| neighbourhood(cell_of(p, COVERAGE_CELL_M)).any(|cell| covered.contains(&cell));
+            |p: &Point3<f64>| cells_around(cell_of(p, COVERAGE_CELL_M)).any(|cell| covered.contains(&cell));
         let surroundings = Surroundings {
             covered: &sees,
             overlap: Some(&overlap),
@@ -58,9 +59,9 @@ fn survey(context: &Context, epoch: &Labelled) -> Result<(CellSet<Cell>, Footpri
     let mut covered = CellSet::default();
     let mut last = None;
     let mut footprints = Footprints::new();
-    for tile in 0..epoch.ingested.tiles.tile_count() {
-        context.progress.check()?;
-        let (cloud, labels) = (epoch.ingested.tiles.load(tile)?, epoch.labels(tile)?);
+    let tiles = &epoch.ingested.tiles;
+    let load = |tile| -> Result<_> { Ok((tiles.load(tile)?, epoch.labels(tile)?)) };
+    let take = |_, (cloud, labels): (Cloud, TileLabels)| {
         for i in (0..cloud.len()).filter(|&i| labels.seen[i]) {
             let place = cloud.world(i);
             let cell = cell_of(&place, COVERAGE_CELL_M);
@@ -71,10 +72,9 @@ fn survey(context: &Context, epoch: &Labelled) -> Result<(CellSet<Cell>, Footpri
                 footprints.add(StoneId(labels.stone[i]), &place);
             }
         }
-    }
+        Ok(())
+    };
+    let all = 0..tiles.tile_count();
+    context.progress.each_prepared("footprints", all, load, take)?;
     Ok((covered, footprints))
-}
-
-fn neighbourhood(cell: Cell) -> impl Iterator<Item = Cell> {
-    (0..27i64).map(move |i| [cell[0] + i % 3 - 1, cell[1] + i / 3 % 3 - 1, cell[2] + i / 9 - 1])
 }

@@ -9,8 +9,9 @@ use crate::storage::store::Name;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use stonewise_core::cloud::TileSource;
+use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::geometry::{OutlineParams, face_outline};
+use stonewise_core::transfer::TileLabels;
 
 /// Makes the outlines of the reference's stones in a step of this name; those of the same labels once.
 pub fn make_outlines(context: &Context, first: &Labelled, name: &str) -> Result<StepDir> {
@@ -40,8 +41,8 @@ pub fn stone_outlines(context: &Context, first: &Labelled) -> Result<Vec<StoneOu
     let mut points: BTreeMap<u32, Vec<Point3<f64>>> = BTreeMap::new();
     let mut outlines: BTreeMap<u32, StoneOutline> = BTreeMap::new();
     let all = 0..tiles.tile_count();
-    context.progress.each("outlines", all, |tile| -> Result<()> {
-        let (cloud, labels) = (tiles.load(tile)?, first.labels(tile)?);
+    let load = |tile| -> Result<_> { Ok((tiles.load(tile)?, first.labels(tile)?)) };
+    let take = |tile, (cloud, labels): (Cloud, TileLabels)| {
         for (i, &stone) in labels.stone.iter().enumerate().filter(|(_, s)| **s != 0) {
             points.entry(stone).or_default().push(cloud.world(i));
         }
@@ -61,6 +62,7 @@ pub fn stone_outlines(context: &Context, first: &Labelled) -> Result<Vec<StoneOu
             ))
         }));
         Ok(())
-    })?;
+    };
+    context.progress.each_prepared("outlines", all, load, take)?;
     Ok(outlines.into_values().collect())
 }

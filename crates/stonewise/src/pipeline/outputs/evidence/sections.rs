@@ -77,7 +77,8 @@ fn gather(
     points: &mut Vec<SectionPoint>,
 ) -> Result<()> {
     let tiles = &epoch.ingested.tiles;
-    context.progress.each("sections", 0..tiles.tile_count(), |tile| {
+    let of_tile = |tile| -> Result<Vec<SectionPoint>> {
+        let mut points = Vec::new();
         let labels = epoch.labels(tile)?;
         if labels.stone.iter().any(|s| searches.contains_key(s)) {
             let cloud = tiles.load(tile)?;
@@ -104,6 +105,12 @@ fn gather(
                 }
             }
         }
-        Ok(())
-    })
+        Ok(points)
+    };
+    context
+        .progress
+        .each_prepared("sections", 0..tiles.tile_count(), of_tile, |_, found| {
+            points.extend(found);
+            Ok(())
+        })
 }

@@ -28,11 +28,11 @@ pub fn thin_cloud(context: &Context, epoch: &Labelled) -> Result<Vec<Candidate>>
     let every = tiles.surveyed.point_count().div_ceil(WANTED).max(1);
     let mut kept = Vec::new();
     let all = 0..tiles.tile_count();
-    context.progress.each("thin cloud", all, |tile| -> Result<()> {
+    let candidates = |tile| -> Result<Vec<Candidate>> {
         let (moved, surveyed, labels) = (tiles.load(tile)?, tiles.surveyed.load(tile)?, epoch.labels(tile)?);
         let chosen =
             (0..moved.len()).filter(|&i| split_mix((tile as u64) << 40 | i as u64).is_multiple_of(every));
-        kept.extend(chosen.map(|i| Candidate {
+        let candidates = chosen.map(|i| Candidate {
             point: ThinPoint {
                 position: moved.world(i),
                 colour: GREY,
@@ -40,8 +40,14 @@ pub fn thin_cloud(context: &Context, epoch: &Labelled) -> Result<Vec<Candidate>>
             },
             surveyed: surveyed.world(i),
             photo: None,
-        }));
-        Ok(())
-    })?;
+        });
+        Ok(candidates.collect())
+    };
+    context
+        .progress
+        .each_prepared("thin cloud", all, candidates, |_, candidates| {
+            kept.extend(candidates);
+            Ok(())
+        })?;
     Ok(kept)
 }

@@ -161,13 +161,18 @@ impl Labelled {
     pub fn extents(&self, progress: &dyn Progress) -> Result<StoneExtents> {
         let tiles = &self.ingested.tiles;
         let mut extents = StoneExtents::default();
-        progress.each("find stones", 0..tiles.tile_count(), |tile| -> Result<()> {
-            let (cloud, labels) = (tiles.load(tile)?, self.labels(tile)?);
-            for i in (0..cloud.len()).filter(|&i| labels.stone[i] != 0) {
-                extents.add(labels.stone[i], cloud.world(i));
-            }
-            Ok(())
-        })?;
+        let load = |tile| -> Result<_> { Ok((tiles.load(tile)?, self.labels(tile)?)) };
+        progress.each_prepared(
+            "find stones",
+            0..tiles.tile_count(),
+            load,
+            |_, (cloud, labels)| {
+                for i in (0..cloud.len()).filter(|&i| labels.stone[i] != 0) {
+                    extents.add(labels.stone[i], cloud.world(i));
+                }
+                Ok(())
+            },
+        )?;
         Ok(extents)
     }
 }

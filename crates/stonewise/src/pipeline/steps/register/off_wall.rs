@@ -43,8 +43,8 @@ impl OffWall {
         let mut contents: HashMap<[i64; 3], CellPoints> = HashMap::new();
         for (number, epoch) in epochs.into_iter().enumerate() {
             let tiles = &epoch.ingested.tiles;
-            progress.each("look off the wall", 0..tiles.tile_count(), |tile| -> Result<()> {
-                let cloud = tiles.load(tile)?;
+            let load = |tile| -> Result<_> { tiles.load(tile) };
+            progress.each_prepared("look off the wall", 0..tiles.tile_count(), load, |_, cloud| {
                 for i in 0..cloud.len() {
                     let cell = cell_of(&cloud.world(i), CELL_M);
                     let place = cloud.world(i) - middle(&cell);

@@ -6,6 +6,7 @@ use crate::storage::spill::{Spill, SpillBins};
 use crate::storage::step::StepDir;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -154,7 +155,8 @@ impl DiskPairs {
     ) -> Result<()> {
         let places = PairPlaces::new(&self.batches.concat(), which > 0, extents);
         let tiles = &epoch.ingested.tiles;
-        progress.each("gather stones", 0..tiles.tile_count(), |tile| {
+        let records = |tile| -> Result<_> {
+            let mut records: BTreeMap<u32, Vec<u8>> = BTreeMap::new();
             let labels = epoch.labels(tile)?;
             if places.reach_into(&tiles.bounds(tile)) || labels.stone.iter().any(|s| places.has(*s)) {
                 let (cloud, origins) = (tiles.load(tile)?, tiles.surveyed.origins(tile)?);
@@ -163,11 +165,17 @@ impl DiskPairs {
                         let (batch, slot) = ((k / BATCH) as u32, (k % BATCH) as u16);
                         let source = origins.source[i];
                         let near = NearPoint { source, ..near };
-                        spill.push(batch, &encode(slot, which, near))?;
+                        let of_batch = records.entry(batch).or_default();
+                        of_batch.extend(encode(slot, which, near));
                     }
                 }
             }
-            Ok(())
+            Ok(records)
+        };
+        let all = 0..tiles.tile_count();
+        progress.each_prepared("gather stones", all, records, |_, records| {
+            let mut records = records.iter();
+            records.try_for_each(|(batch, records)| spill.push(*batch, records).map(drop))
         })
     }
 }

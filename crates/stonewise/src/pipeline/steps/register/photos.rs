@@ -93,29 +93,32 @@ impl DiskPhotos {
         }
         let shown = choose(&boxes, &list, &paths, &params);
         let mut spill = Spill::new(&step.file("chips"), |k: &u32| format!("c{k}"))?;
+        let chips = |number: usize| -> Result<_> {
+            let Some(stones) = shown.get(&number) else {
+                return Ok(Vec::new());
+            };
+            let path = paths[number].0;
+            let picture = match read_rgb(path) {
+                Ok(picture) => picture,
+                Err(error) => {
+                    let message = PHOTO_NOT_TRACKED.say(&[("error", error.to_string().into())]);
+                    warnings.notice(STEP, path.to_string_lossy(), message);
+                    return Ok(Vec::new());
+                }
+            };
+            let chips = stones.iter().filter_map(|&(k, corners)| {
+                let chip = cut(&picture, boxes[k].slot, number as u32, corners)?;
+                Some((boxes[k].batch, chip))
+            });
+            Ok(chips.collect())
+        };
+        let all = 0..paths.len();
         context
             .progress
-            .begin("cut stones out of photos", list.len() as u64);
-        for (number, (path, _)) in paths.iter().enumerate() {
-            context.progress.check()?;
-            if let Some(stones) = shown.get(&number) {
-                match read_rgb(path) {
-                    Ok(picture) => {
-                        for &(k, corners) in stones {
-                            if let Some(record) = cut(&picture, boxes[k].slot, number as u32, corners) {
-                                spill.push(boxes[k].batch, &record)?;
-                            }
-                        }
-                    }
-                    Err(error) => warnings.notice(
-                        STEP,
-                        path.to_string_lossy(),
-                        PHOTO_NOT_TRACKED.say(&[("error", error.to_string().into())]),
-                    ),
-                }
-            }
-            context.progress.advance(1);
-        }
+            .each_prepared("cut stones out of photos", all, chips, |_, chips| {
+                let mut chips = chips.iter();
+                chips.try_for_each(|(batch, chip)| spill.push(*batch, chip).map(drop))
+            })?;
         Ok(Some(Self {
             photos: list,
             params,
@@ -145,16 +148,11 @@ fn camera(view: &View, labelled: &Labelled) -> Box<dyn PhotoCamera> {
 
 /// The boxes of all pairs, and how many each batch holds.
 fn boxes(pairs: &DiskPairs) -> Result<(Vec<Boxed>, Vec<usize>)> {
-    let mut boxes = Vec::new();
-    let mut counts = Vec::new();
-    for batch in 0..pairs.batch_count() {
+    let of_batch = |batch: usize| -> Result<(Vec<Option<Boxed>>, usize)> {
         let loaded = pairs.load(batch)?;
-        counts.push(loaded.len());
         let shifts = pairs.shifts(batch);
-        let found: Vec<Option<Boxed>> = loaded
-            .par_iter()
-            .zip(&shifts)
-            .enumerate()
+        let found = loaded.iter().zip(&shifts).enumerate();
+        let found = found
             .map(|(slot, (pair, shift))| {
                 let frame = FaceFrame::from_normal(&pair.normal);
                 let turn = frame.face_from_world();
@@ -171,9 +169,11 @@ fn boxes(pairs: &DiskPairs) -> Result<(Vec<Boxed>, Vec<usize>)> {
                 })
             })
             .collect();
-        boxes.extend(found.into_iter().flatten());
-    }
-    Ok((boxes, counts))
+        Ok((found, loaded.len()))
+    };
+    let batches = (0..pairs.batch_count()).into_par_iter().map(of_batch);
+    let (found, counts): (Vec<_>, Vec<_>) = batches.collect::<Result<Vec<_>>>()?.into_iter().unzip();
+    Ok((found.into_iter().flatten().flatten().collect(), counts))
 }
 
 /// The part of an image: lowest pixel, and one beyond the highest.

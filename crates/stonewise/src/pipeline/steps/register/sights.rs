@@ -232,10 +232,14 @@ impl Pass<'_> {
         progress: &dyn Progress,
     ) -> Result<()> {
         let tiles = &self.epoch.ingested.tiles;
-        progress.each("compare sources", 0..tiles.tile_count(), |tile| {
+        let load = |tile| -> Result<_> {
             let labels = self.epoch.labels(tile)?;
-            if labels.stone.iter().any(|s| self.stones.contains_key(s)) {
-                let (cloud, origins) = (tiles.load(tile)?, tiles.surveyed.origins(tile)?);
+            let is_shown = labels.stone.iter().any(|s| self.stones.contains_key(s));
+            let points = || Ok((labels, tiles.load(tile)?, tiles.surveyed.origins(tile)?));
+            is_shown.then(points).transpose()
+        };
+        progress.each_prepared("compare sources", 0..tiles.tile_count(), load, |_, loaded| {
+            if let Some((labels, cloud, origins)) = loaded {
                 for (i, stone) in labels.stone.iter().enumerate() {
                     let Some(&k) = self.stones.get(stone) else {
                         continue;
