@@ -1,6 +1,8 @@
 //! Everything that can stop a run.
 
 use std::convert::Infallible;
+use std::io::ErrorKind;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use stonewise_core::change::CompareError;
 use stonewise_core::progress::Interrupted;
@@ -12,10 +14,10 @@ use stonewise_segment::tiling::TilingError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The project file does not parse, or holds an impossible value.
+    /// The project file, or another file of parameters, does not parse or holds an impossible value.
     #[error("{path}:{line}: {message}", path = .path.display())]
     Project {
-        /// The project file.
+        /// The file.
         path: PathBuf,
         /// Line, counted from 1.
         line: usize,
@@ -35,14 +37,14 @@ pub enum Error {
     #[error("{0}")]
     Parameters(String),
     /// A file could not be read or written.
-    #[error("{action} failed: {source}: {path}", path = .path.display())]
+    #[error("{}: {path}", failed(.action, .cause), path = .path.display())]
     Io {
         /// What was tried.
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
+        /// The system's error, which the message holds.
+        cause: std::io::Error,
     },
     /// An input cannot be used.
     #[error("{message}: {path}", path = .path.display())]
@@ -55,7 +57,7 @@ pub enum Error {
     /// An output folder that must not be written into.
     #[error("{message}: {path}", path = .path.display())]
     Output {
-        /// The folder.
+        /// The folder, or the file in it.
         path: PathBuf,
         /// Why, and the fix.
         message: String,
@@ -214,7 +216,7 @@ impl From<AdjustError<Error>> for Error {
 }
 
 impl Error {
-    /// Whether the command was used wrongly: an invalid project file, invalid parameters, or an output folder
+    /// Whether the command was used wrongly: an invalid project file, invalid parameters or a file of them, or an output folder
     /// that belongs to something else.
     pub fn is_wrong_usage(&self) -> bool {
         matches!(
@@ -264,10 +266,30 @@ impl Error {
 
     /// Turns a system error into one that names the file.
     pub fn io<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(std::io::Error) -> Self + 'a {
-        move |source| Self::Io {
+        move |cause| Self::Io {
             action,
             path: path.to_path_buf(),
-            source,
+            cause,
+        }
+    }
+
+    /// Turns an error of the TOML parser into an error of one line that names the file and the line in it.
+    pub fn toml(path: &Path, text: &str, error: &toml::de::Error) -> Self {
+        Self::in_text(path, text, error.span(), Self::toml_message(error))
+    }
+
+    /// The message of the TOML parser in one line.
+    pub fn toml_message(error: &toml::de::Error) -> String {
+        error.message().trim().replace('\n', "; ")
+    }
+
+    /// What is wrong with a part of a file's text, or with all of it.
+    pub fn in_text(path: &Path, text: &str, part: Option<Range<usize>>, message: String) -> Self {
+        let before = text.get(..part.map_or(0, |part| part.start));
+        Self::Project {
+            path: path.to_path_buf(),
+            line: before.unwrap_or("").matches('\n').count() + 1,
+            message,
         }
     }
 
@@ -277,6 +299,14 @@ impl Error {
             path: path.to_path_buf(),
             message: message.into(),
         }
+    }
+}
+
+/// What could not be done, and why, without the number and the capitals of the system's error where a file is missing.
+fn failed(action: &str, cause: &std::io::Error) -> String {
+    match cause.kind() {
+        ErrorKind::NotFound => format!("{action} failed: no such file or folder"),
+        _ => format!("{action} failed: {cause}"),
     }
 }
 

@@ -58,6 +58,28 @@ pub fn write_readable_json(path: &Path, value: &impl Serialize) -> Result<()> {
     write_text(path, &(text + "\n"))
 }
 
+/// Reads the text of a project file, or of another file of parameters.
+///
+/// # Errors
+/// The file cannot be read; with the line: it is not in UTF-8.
+pub fn read_parameters(path: &Path) -> Result<String> {
+    String::from_utf8(read_bytes(path)?).map_err(|e| {
+        let start = e.utf8_error().valid_up_to();
+        let text = String::from_utf8_lossy(e.as_bytes());
+        let message = "a character that is not in UTF-8: save the file as UTF-8".to_owned();
+        Error::in_text(path, &text, Some(start..start), message)
+    })
+}
+
+/// Reads parameters from a file in TOML.
+///
+/// # Errors
+/// The file cannot be read; with the line: it is no TOML, or holds a key that is not known or a value of another kind.
+pub fn read_toml<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
+    let text = read_parameters(path)?;
+    toml::from_str(&text).map_err(|e| Error::toml(path, &text, &e))
+}
+
 /// Reads what an earlier step wrote.
 ///
 /// # Errors

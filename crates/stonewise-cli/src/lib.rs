@@ -14,6 +14,7 @@ mod counted;
 mod note;
 mod printer;
 mod screen;
+mod stdout;
 mod steps;
 
 use clap::error::ErrorKind;
@@ -25,7 +26,7 @@ use std::io::Write;
 const DONE: u8 = 0;
 /// Something failed.
 const FAILED: u8 = 1;
-/// Wrong arguments, or a wrong project file.
+/// Wrong arguments, or a wrong project file or other file of parameters.
 const WRONG_USAGE: u8 = 2;
 /// Finished, but some inputs were left out, or the results as a whole are in doubt.
 const IN_DOUBT: u8 = 3;

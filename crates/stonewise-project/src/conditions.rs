@@ -5,6 +5,8 @@ use crate::day::day_of;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::Result;
+use stonewise_base::messages::Said;
+use stonewise_base::messages::notices::{CONDITION_AFTER, CONDITION_BEFORE, CONDITION_BETWEEN};
 
 /// Readings by the name of their column.
 #[derive(Clone, Debug)]
@@ -22,8 +24,8 @@ pub struct ConditionsFile {
 pub struct ConditionsAt {
     /// Values by column.
     pub values: BTreeMap<String, f64>,
-    /// What it does not say, one sentence for each column.
-    pub gaps: Vec<String>,
+    /// Columns without a value on that day, and why.
+    pub gaps: Vec<(String, Said)>,
 }
 
 impl ConditionsFile {
@@ -75,22 +77,24 @@ impl ConditionsFile {
                 (Some((from, low)), Some((to, high))) if to - from <= self.longest_gap_days => {
                     Ok(low + (high - low) * (day - from) / (to - from))
                 }
-                (Some((from, _)), Some((to, _))) => Err(format!(
-                    "{file}: no {name} on {date}: its readings before and after lie {:.0} days apart, more than \
-                     conditions.longest_gap_days = {}",
-                    to - from,
-                    self.longest_gap_days
-                )),
-                _ => Err(format!(
-                    "{file}: no {name} on {date}, which lies {} its readings; nothing is extrapolated",
-                    if before.is_none() { "before" } else { "after" }
-                )),
+                (Some((from, _)), Some((to, _))) => Err((&CONDITION_BETWEEN, to - from)),
+                (None, _) => Err((&CONDITION_BEFORE, 0.0)),
+                (_, None) => Err((&CONDITION_AFTER, 0.0)),
             };
             match value {
                 Ok(value) => {
                     found.values.insert(name.clone(), value);
                 }
-                Err(gap) => found.gaps.push(gap),
+                Err((gap, days)) => {
+                    let words = [
+                        ("file", file.as_ref().into()),
+                        ("name", name.as_str().into()),
+                        ("date", date.into()),
+                        ("days", Said::numbers(format!("{days:.0}"))),
+                        ("longest", self.longest_gap_days.to_string().into()),
+                    ];
+                    found.gaps.push((name.clone(), gap.say(&words)));
+                }
             }
         }
         found
@@ -121,11 +125,14 @@ mod tests {
         let gap = at("2025-05-01");
         assert!(gap.values.is_empty());
         assert!(
-            gap.gaps[0].contains("levels.csv: no reservoir_level_m on 2025-05-01")
-                && gap.gaps[0].contains("45 days")
+            gap.gaps[0]
+                .1
+                .english
+                .contains("levels.csv: no reservoir_level_m on 2025-05-01")
+                && gap.gaps[0].1.english.contains("45 days")
         );
-        assert!(at("2025-03-31").gaps[0].contains("before its readings"));
-        assert!(at("2025-05-22").gaps[0].contains("after its readings"));
+        assert!(at("2025-03-31").gaps[0].1.english.contains("before its readings"));
+        assert!(at("2025-05-22").gaps[0].1.english.contains("after its readings"));
         // A reading of the day itself needs no other.
         assert_eq!(at("2025-05-21").values["reservoir_level_m"], 301.0);
     }

@@ -51,8 +51,8 @@ const NAMES: usize = 4;
 
 /// The first lines of a project file. Editors read the first one.
 const HEAD: &str = "#:schema ./stonewise.schema.json
-# Paths are relative to this file. Parameters: docs/src/project-file.md. Editors complete and explain them
-# once the schema is beside this file: stonewise schema > stonewise.schema.json
+# Paths are relative to this file. Editors complete and explain all keys once the schema is beside this file:
+# stonewise schema > stonewise.schema.json
 ";
 
 /// Writes `dir/stonewise.toml`: one epoch for each folder of `dir` that holds a cloud in it or below, else for
@@ -78,7 +78,7 @@ const HEAD: &str = "#:schema ./stonewise.schema.json
 pub fn init(dir: &Path) -> Result<Initialised> {
     let path = dir.join("stonewise.toml");
     if path.exists() {
-        return Err(Error::Input {
+        return Err(Error::Output {
             path,
             message: "there is a project file already; remove it to start anew".into(),
         });
@@ -195,7 +195,7 @@ fn project_text(dir: &Path, epochs: &[Found]) -> String {
     );
     for epoch in epochs {
         let _ = writeln!(text, "\n[[epochs]]\nname = {}", quoted(&epoch.name));
-        text.push_str("# date = 2026-04-01   # of the survey: for the report and for series\n");
+        text.push_str("# date = YYYY-MM-DD   # of the survey: for the report and for series\n");
         let _ = writeln!(text, "clouds = {}", quoted_list(&epoch.clouds));
         let has_photos = epoch.images.is_some() && epoch.cameras.is_some();
         if !has_photos {

@@ -13,6 +13,9 @@ use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::{Error, Result};
+use stonewise_base::files::read_parameters;
+use stonewise_base::messages::Said;
+use stonewise_base::messages::notices::{EPOCH_WITHOUT_DATE, EPOCHS_NUMBERED};
 use stonewise_base::report_params::{ReportParams, logo_type};
 use stonewise_base::settings::{IngestParams, RegistrationParams, SegmentParams, Settings};
 use stonewise_base::thresholds::Thresholds;
@@ -346,15 +349,7 @@ fn project_text(path: &Path) -> Result<String> {
             path: path.to_path_buf(),
         });
     }
-    let bytes = fs::read(path).map_err(Error::io("reading the project file", path))?;
-    String::from_utf8(bytes).map_err(|e| {
-        let (valid, _) = e.as_bytes().split_at(e.utf8_error().valid_up_to());
-        Error::Project {
-            path: path.to_path_buf(),
-            line: valid.iter().filter(|b| **b == b'\n').count() + 1,
-            message: "a character that is not in UTF-8: save the project file as UTF-8".to_owned(),
-        }
-    })
+    read_parameters(path)
 }
 
 /// The text of a project file, to point into.
@@ -365,12 +360,7 @@ struct Source<'a> {
 
 impl Source<'_> {
     fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
-        let line = self.text.get(..span.start).unwrap_or("").matches('\n').count() + 1;
-        Error::Project {
-            path: self.path.to_path_buf(),
-            line,
-            message: message.into(),
-        }
+        Error::in_text(self.path, self.text, Some(span), message.into())
     }
 
     /// Where a value stands, or else the innermost table that is there. `path`: keys, and numbers in arrays.
@@ -468,7 +458,7 @@ impl Source<'_> {
     }
 
     /// Moves the named epoch to the front; a note where that changes the numbers of epochs.
-    fn put_reference_first(&self, name: &Spanned<String>, epochs: &mut [Epoch]) -> Result<Option<String>> {
+    fn put_reference_first(&self, name: &Spanned<String>, epochs: &mut [Epoch]) -> Result<Option<Said>> {
         let Some(at) = epochs.iter().position(|e| e.name == *name.get_ref()) else {
             let names: Vec<&str> = epochs.iter().map(|e| e.name.as_str()).collect();
             let message = format!("reference must name an epoch: {}", names.join(", "));
@@ -491,11 +481,10 @@ impl Source<'_> {
         let note = || {
             let numbered = epochs.iter().zip(1..).map(|(e, n)| format!("{n} {}", e.name));
             let numbered: Vec<String> = numbered.collect();
-            format!(
-                "motions count from epoch {:?}; in the results the epochs are numbered {}",
-                name.get_ref(),
-                numbered.join(", ")
-            )
+            EPOCHS_NUMBERED.say(&[
+                ("name", name.get_ref().as_str().into()),
+                ("numbered", numbered.join(", ").into()),
+            ])
         };
         Ok((at > 0).then(note))
     }
@@ -566,7 +555,7 @@ impl Source<'_> {
     /// What the reader of TOML says, with the fix where it is a usual slip.
     fn not_toml(&self, error: &toml::de::Error) -> Error {
         let span = error.span().unwrap_or(0..0);
-        let message = error.message().trim().replace('\n', "; ");
+        let message = Error::toml_message(error);
         let start = self
             .text
             .get(..span.start)
@@ -642,28 +631,26 @@ impl Source<'_> {
 }
 
 /// Adds to dated epochs the readings of their day that they do not state themselves; returns what is not known.
-fn add_conditions(file: &ConditionsFile, epochs: &mut [Epoch]) -> Vec<String> {
+fn add_conditions(file: &ConditionsFile, epochs: &mut [Epoch]) -> Vec<Said> {
     let mut notes = Vec::new();
     for epoch in epochs {
         let Some(date) = &epoch.date else {
-            notes.push(format!(
-                "epoch {:?} has no date, so that nothing in {} belongs to it: give it one",
-                epoch.name,
-                file.path.display()
-            ));
+            let file = file.path.to_string_lossy();
+            notes.push(EPOCH_WITHOUT_DATE.say(&[
+                ("name", epoch.name.as_str().into()),
+                ("file", file.as_ref().into()),
+            ]));
             continue;
         };
         let found = file.at(date);
         for (name, value) in found.values {
             epoch.conditions.entry(name).or_insert(value);
         }
-        let own = |gap: &&String| {
-            !epoch
-                .conditions
-                .keys()
-                .any(|name| gap.contains(&format!(" no {name} on")))
-        };
-        notes.extend(found.gaps.iter().filter(own).cloned());
+        let open = found
+            .gaps
+            .into_iter()
+            .filter(|(name, _)| !epoch.conditions.contains_key(name));
+        notes.extend(open.map(|(_, gap)| gap));
     }
     notes
 }
@@ -698,7 +685,7 @@ mod tests {
         let gaps: Vec<bool> = project
             .notes
             .iter()
-            .map(|n| n.contains("no air_c on 2025-04-0"))
+            .map(|n| n.english.contains("no air_c on 2025-04-0"))
             .collect();
         assert_eq!(gaps, [true, true]);
         assert!(project.inputs().iter().any(|path| path.ends_with("levels.csv")));
@@ -884,7 +871,7 @@ mod tests {
             ]
         );
         assert!(
-            project.notes[0].contains("1 2025, 2 2024, 3 2026"),
+            project.notes[0].english.contains("1 2025, 2 2024, 3 2026"),
             "{:?}",
             project.notes
         );

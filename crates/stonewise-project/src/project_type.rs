@@ -7,6 +7,7 @@ use crate::sources::SourceRule;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::Result;
+use stonewise_base::messages::Said;
 use stonewise_base::part::Part;
 use stonewise_base::settings::{Align, Settings};
 use stonewise_core::change::M3c2Params;
@@ -29,8 +30,8 @@ pub struct Project {
     pub epochs: Epochs<Epoch>,
     /// Parameters of all steps.
     pub settings: Settings,
-    /// Notes for the user on how the file was read, one sentence each: another numbering of epochs.
-    pub notes: Vec<String>,
+    /// Notes for the user on how the file was read: another numbering of epochs, missing conditions.
+    pub notes: Vec<Said>,
     /// Corrections by hand; absent where the project names none.
     pub edits: Option<EditsFile>,
     /// The file of readings; absent where the project names none.

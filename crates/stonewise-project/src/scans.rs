@@ -30,11 +30,10 @@ impl ScansProject {
     pub fn new(scans: &[PathBuf], dir: &Path) -> Result<Self> {
         let path = dir.join("stonewise.toml");
         if let [only] = scans {
-            return Err(Error::Input {
-                path: only.clone(),
-                message: "a single scan shows no motion: name those of two epochs, or more, in order of time"
-                    .to_owned(),
-            });
+            return Err(Error::Parameters(format!(
+                "a single scan shows no motion: name those of two epochs, or more, in order of time: {}",
+                only.display()
+            )));
         }
         let scans: Vec<PathBuf> = scans
             .iter()
@@ -69,7 +68,7 @@ impl ScansProject {
 
 fn text_of(scans: &[PathBuf]) -> String {
     let mut text = String::from(
-        "# Written by `stonewise run`; edits stay. Parameters: docs/src/project-file.md.\n[project]\nname = \"scans\"\n",
+        "# Written by `stonewise run`; edits stay. All keys: `stonewise schema`.\n[project]\nname = \"scans\"\n",
     );
     for (name, scan) in names(scans).iter().zip(scans) {
         let scan = quoted(&scan.to_string_lossy());

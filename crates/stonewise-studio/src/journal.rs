@@ -285,10 +285,10 @@ fn journal_of(file: &Path) -> PathBuf {
 }
 
 fn io_error<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(io::Error) -> Error + 'a {
-    move |source| Error::Io {
+    move |cause| Error::Io {
         action,
         path: path.to_path_buf(),
-        source,
+        cause,
     }
 }
 

@@ -43,11 +43,12 @@ use stonewise_report::verdict;
 pub use adapt::{Adapted, Fate, StoneChange, Taught, adapt, keep_detector, teach};
 pub use address_space::{require as require_memory, require_start};
 pub use error::{Error, Result};
+pub use files::read_toml;
 pub use output::{OutputFolder, Owner, PREVIOUS_DIR, UNFINISHED_FILE};
 pub use part::Part;
 pub use pipeline::{
-    Comparison, Coordinator, PairSummary, Plan, PlanOptions, Summary, Unit, UnitDone, Until, compare_clouds,
-    do_unit, plan, run, tile_clouds,
+    Comparison, Coordinator, PROJECT_STEP, PairSummary, Plan, PlanOptions, Summary, Unit, UnitDone, Until,
+    compare_clouds, do_unit, plan, run, tile_clouds,
 };
 pub use processor::processor_class;
 pub use report_params::{Language, ReportParams};

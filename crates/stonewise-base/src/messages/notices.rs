@@ -4,6 +4,32 @@ use super::message::{Message, messages};
 
 messages! {
     NOTICES {
+        EPOCHS_NUMBERED = "epochs-numbered":
+            "motions count from epoch \"{name}\"; in the results the epochs are numbered {numbered}",
+            "Bewegungen zählen ab Epoche „{name}“; in den Ergebnissen sind die Epochen so nummeriert: {numbered}";
+
+        EPOCH_WITHOUT_DATE = "missing-condition":
+            "epoch \"{name}\" has no date, so nothing in {file} belongs to it: give it one",
+            "Epoche „{name}“ hat kein Datum, daher gehört nichts in {file} zu ihr; ein Datum angeben";
+
+        CONDITION_BETWEEN = "missing-condition":
+            "{file}: no {name} on {date}: its readings before and after lie {days} days apart, more than \
+            conditions.longest_gap_days = {longest}",
+            "{file}: kein {name} am {date}: die Ablesungen davor und danach liegen {days} Tage auseinander, mehr als \
+            conditions.longest_gap_days = {longest}";
+
+        CONDITION_BEFORE = "missing-condition":
+            "{file}: no {name} on {date}, which lies before its readings; nothing is extrapolated",
+            "{file}: kein {name} am {date}: der Tag liegt vor der ersten Ablesung; es wird nicht extrapoliert";
+
+        CONDITION_AFTER = "missing-condition":
+            "{file}: no {name} on {date}, which lies after its readings; nothing is extrapolated",
+            "{file}: kein {name} am {date}: der Tag liegt nach der letzten Ablesung; es wird nicht extrapoliert";
+
+        EDIT_WITHOUT_EFFECT = "edit-without-effect":
+            "{edit} has no effect; {reasons}",
+            "{edit} bewirkt nichts; {reasons}";
+
         INVALID_POINTS = "invalid-points":
             "points without finite coordinates, left out: {n}",
             "Punkte ohne endliche Koordinaten, weggelassen: {n}";
@@ -188,8 +214,8 @@ messages! {
             "seine Kamera in {file} ist nicht zu verwenden ({reason}); das Foto ist weggelassen";
 
         NO_SUCH_PHOTO = "camera-not-used":
-            "camera not used: no such photo in {folder}",
-            "Kamera nicht verwendet: kein solches Foto in {folder}";
+            "cameras not used because their photos are not in {folder}: {n}, for example {name}",
+            "Kameras nicht verwendet, weil ihre Fotos nicht in {folder} liegen: {n}, zum Beispiel {name}";
 
         CAMERA_NOT_USED = "camera-not-used":
             "camera not used: {reason}",

@@ -1,6 +1,7 @@
-//! What a reader of a camera file has to say, in both languages.
+//! Remarks of readers of camera files, and why edits have no effect, in both languages.
 
 use super::Said;
+use stonewise_core::transfer::NoEffect;
 use stonewise_io::cameras::Remark;
 
 impl From<&Remark> for Said {
@@ -38,4 +39,30 @@ fn german(remark: &Remark) -> Option<String> {
         }
         Remark::RigSlave | Remark::NotPlaced(_) => return None,
     })
+}
+
+impl From<&NoEffect> for Said {
+    fn from(reason: &NoEffect) -> Self {
+        let german = match reason {
+            NoEffect::NoStone { at } => {
+                format!("kein Stein bei ({:.2}; {:.2}) m", at.x, at.y).replace('.', ",")
+            }
+            NoEffect::OneStone { stone } => format!("nennt nur einen Stein, {stone}"),
+            NoEffect::NotCrossed => "die Linie quert keinen Stein von Rand zu Rand".to_owned(),
+            NoEffect::SmallPart {
+                stone,
+                points,
+                needed,
+            } => format!("ein Teil von Stein {stone} hätte zu wenige Punkte: {points}, {needed} sind nötig"),
+            NoEffect::FewPoints { points, needed } => {
+                format!("zu wenige Punkte im Umriss gehören zu keinem Stein: {points}, {needed} sind nötig")
+            }
+            NoEffect::NothingInside => "im Umriss liegt kein Stein".to_owned(),
+            NoEffect::NoPlace(reason) => reason.clone(),
+        };
+        Self {
+            german: Some(german),
+            ..reason.to_string().into()
+        }
+    }
 }

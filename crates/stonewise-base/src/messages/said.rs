@@ -46,6 +46,12 @@ impl Said {
         german.filter(|_| language == Language::German)
     }
 
+    /// The English sentence and its code in one line.
+    pub fn line(&self) -> String {
+        let code = self.code.iter().map(|code| format!(" [{code}]"));
+        format!("{}{}", self.english, code.collect::<String>())
+    }
+
     /// What was looked at, and what was seen, with a colon between them; in German where both are.
     pub fn about(topic: &Self, text: &Self) -> Self {
         let german = topic.german.as_ref().zip(text.german.as_ref());

@@ -4,6 +4,7 @@ use crate::args::AdaptArgs;
 use crate::commands::Outcome;
 use crate::counted::counted;
 use crate::printer::Printer;
+use crate::stdout::stdout;
 use anyhow::Result;
 use std::io::Write;
 use std::path::Path;
@@ -50,11 +51,7 @@ pub fn adapt(args: &AdaptArgs, force: bool, printer: &Printer) -> Result<Outcome
                 "the trained detector is better; put this into {}:",
                 project.path.display()
             ));
-            writeln!(
-                std::io::stdout(),
-                "[segment]\nmodel = {:?}",
-                model.to_string_lossy()
-            )?;
+            writeln!(stdout(), "[segment]\nmodel = {:?}", model.to_string_lossy())?;
         }
         None => printer.log("no gain is shown: the detector stays as it is"),
     }

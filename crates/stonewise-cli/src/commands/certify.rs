@@ -4,6 +4,7 @@ use crate::args::CertifyArgs;
 use crate::commands::Outcome;
 use crate::counted::counted;
 use crate::printer::Printer;
+use crate::stdout::stdout;
 use anyhow::Result;
 use std::io::Write;
 use stonewise::experiment::{CertifyOptions, certify as make};
@@ -23,7 +24,7 @@ pub fn certify(args: &CertifyArgs, force: bool, printer: &Printer) -> Result<Out
     };
     let certificate = make(&options, folder.path(), printer)?;
     printer.finish();
-    let mut out = std::io::stdout();
+    let mut out = stdout();
     for figure in &certificate.figures {
         let answer = if figure.holds { "holds" } else { "FAILS" };
         let value = figure.value.map_or("-".to_owned(), |v| format!("{v:.4}"));

@@ -3,6 +3,7 @@
 use crate::args::CheckArgs;
 use crate::commands::Outcome;
 use crate::printer::Printer;
+use crate::stdout::stdout;
 use anyhow::{Result, bail};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -18,7 +19,7 @@ pub fn check(args: &CheckArgs, force: bool, printer: &Printer) -> Result<Outcome
     let page = page_path(args, force)?;
     let report = look_at(&project, &args.out, Depth::Full, printer)?;
     printer.finish();
-    write!(std::io::stdout(), "{}", report.text())?;
+    write!(stdout(), "{}", report.text())?;
     match report.write_page(&page, &project) {
         Ok(()) => printer.log(&format!("pictures: {}", page.display())),
         Err(error) => printer.log(&format!(

@@ -2,6 +2,7 @@
 
 use crate::args::{Args, CompletionsArgs, ManArgs};
 use crate::commands::Outcome;
+use crate::stdout::stdout;
 use anyhow::{Context, Result, bail};
 use clap::CommandFactory;
 use std::fs;
@@ -12,7 +13,7 @@ use stonewise_io::atomic::write_atomically;
 pub fn completions(args: &CompletionsArgs) -> Result<Outcome> {
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut Args::command(), "stonewise", &mut text);
-    std::io::stdout().write_all(&text)?;
+    stdout().write_all(&text)?;
     Ok(Outcome::Done)
 }
 

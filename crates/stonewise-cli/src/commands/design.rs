@@ -3,6 +3,7 @@
 use crate::args::DesignArgs;
 use crate::commands::Outcome;
 use crate::printer::Printer;
+use crate::stdout::stdout;
 use anyhow::Result;
 use serde::Serialize;
 use std::io::Write;
@@ -38,7 +39,7 @@ pub fn design(args: &DesignArgs, force: bool, printer: &Printer) -> Result<Outco
 
 fn show(args: &DesignArgs, designed: &impl Serialize, printer: &Printer) -> Result<Outcome> {
     printer.finish();
-    writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(designed)?)?;
+    writeln!(stdout(), "{}", serde_json::to_string_pretty(designed)?)?;
     printer.log(&format!("open {}", args.out.join("design.html").display()));
     Ok(Outcome::Done)
 }

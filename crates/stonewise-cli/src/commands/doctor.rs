@@ -1,6 +1,7 @@
 //! `doctor`.
 
 use crate::commands::Outcome;
+use crate::stdout::stdout;
 use anyhow::Result;
 use std::env;
 use std::io::Write;
@@ -43,7 +44,7 @@ pub fn doctor() -> Result<Outcome> {
             python().unwrap_or_else(|| "no python3 on the path; only the Python module needs it".to_owned()),
         ),
     ];
-    let mut out = std::io::stdout();
+    let mut out = stdout();
     for (what, found) in lines {
         writeln!(out, "{what:<18} {found}")?;
     }

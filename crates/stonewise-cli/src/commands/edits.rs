@@ -4,6 +4,7 @@ use crate::args::{EditsCheckArgs, EditsCommand, EditsImportArgs};
 use crate::commands::Outcome;
 use crate::counted::counted;
 use crate::printer::Printer;
+use crate::stdout::stdout;
 use anyhow::{Result, bail};
 use std::io::Write;
 use stonewise::edits::{EditsFile, Signed, import};
@@ -60,7 +61,7 @@ fn read_edits(args: &EditsImportArgs, printer: &Printer) -> Result<Outcome> {
 /// The table goes to stdout.
 fn check(args: &EditsCheckArgs) -> Result<Outcome> {
     let file = EditsFile::read(&args.file)?;
-    let mut out = std::io::stdout();
+    let mut out = stdout();
     writeln!(out, "edit\tline\tdo\tdrawn in\tshape\twho\twhen\twhy")?;
     for (index, edit) in file.edits.iter().enumerate() {
         writeln!(

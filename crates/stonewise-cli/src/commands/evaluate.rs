@@ -3,28 +3,25 @@
 use crate::args::EvaluateArgs;
 use crate::commands::Outcome;
 use crate::printer::Printer;
+use crate::stdout::stdout;
 use anyhow::Result;
 use std::io::Write;
 use std::path::Path;
 use stonewise::{OutputFolder, evaluate_truth};
-use stonewise_core::evaluate::EvaluationParams;
+use stonewise_core::evaluate::{Evaluation, EvaluationParams};
 
 /// Scores a finished run; the evaluation goes to stdout as JSON.
 pub fn evaluate(args: &EvaluateArgs, printer: &Printer) -> Result<Outcome> {
     let folder = OutputFolder::of_results(&args.results)?;
-    let evaluation = evaluate_truth(&args.results, &args.truth, &EvaluationParams::default())?;
+    let evaluation = score(&args.results, &args.truth, printer)?;
     folder.note_made_anew()?;
     printer.finish();
-    writeln!(
-        std::io::stdout(),
-        "{}",
-        serde_json::to_string_pretty(&evaluation)?
-    )?;
+    writeln!(stdout(), "{}", serde_json::to_string_pretty(&evaluation)?)?;
     Ok(Outcome::Done)
 }
 
-/// Scores a finished run and says the main figures in a line.
-pub fn score(results: &Path, truth: &Path, printer: &Printer) -> Result<()> {
+/// Scores a finished run, prints the main figures in a line and returns the evaluation.
+pub fn score(results: &Path, truth: &Path, printer: &Printer) -> Result<Evaluation> {
     let evaluation = evaluate_truth(results, truth, &EvaluationParams::default())?;
     if let Some(score) = &evaluation.external {
         let rmse = |s: &Option<stonewise_core::evaluate::ErrorStatistics>| {
@@ -39,5 +36,5 @@ pub fn score(results: &Path, truth: &Path, printer: &Printer) -> Result<()> {
             rmse(&score.motions.errors.out_of_plane),
         ));
     }
-    Ok(())
+    Ok(evaluation)
 }

@@ -4,6 +4,7 @@ use crate::args::{ExperimentCommand, PaperArgs, SensitivityArgs};
 use crate::commands::{Outcome, part::part, simulate};
 use crate::counted::counted;
 use crate::printer::Printer;
+use crate::stdout::stdout;
 use anyhow::{Result, bail};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -48,7 +49,7 @@ fn paper(args: &PaperArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     };
     let tables = run_paper(&surveys, &options, folder.path(), printer)?;
     printer.finish();
-    write!(std::io::stdout(), "{}", tables.markdown())?;
+    write!(stdout(), "{}", tables.markdown())?;
     printer.log(&format!("open {}", args.out.join("index.html").display()));
     Ok(Outcome::Done)
 }

@@ -2,6 +2,7 @@
 
 use crate::args::ExplainArgs;
 use crate::commands::Outcome;
+use crate::stdout::stdout;
 use anyhow::{Context, Result};
 use std::io::Write;
 
@@ -10,7 +11,7 @@ const PAGE: &str = include_str!("../../messages.md");
 
 /// The section of a code, or the list of all codes, goes to stdout.
 pub fn explain(args: &ExplainArgs) -> Result<Outcome> {
-    let mut out = std::io::stdout();
+    let mut out = stdout();
     match &args.code {
         None => codes().try_for_each(|code| writeln!(out, "{code}"))?,
         Some(code) => {

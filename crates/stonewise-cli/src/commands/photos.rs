@@ -4,6 +4,7 @@ use crate::args::PhotosArgs;
 use crate::commands::Outcome;
 use crate::counted::counted;
 use crate::printer::Printer;
+use crate::stdout::stdout;
 use anyhow::Result;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -25,7 +26,7 @@ pub fn photos(args: &PhotosArgs, force: bool, printer: &Printer) -> Result<Outco
     }
     let photos = unpack_e57_photos::<Error>(&args.scans, folder.path(), printer)?;
     printer.finish();
-    write!(std::io::stdout(), "{}", summary(&photos, &args.out))?;
+    write!(stdout(), "{}", summary(&photos, &args.out))?;
     Ok(if photos.left_out.is_empty() {
         Outcome::Done
     } else {

@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use std::path::Path;
 use stonewise::results::records::{EpochVerdict, State};
 use stonewise::results::{Status, StoneRow};
-use stonewise::{OutputFolder, PREVIOUS_DIR, Project, ScansProject, Summary, Until, is_scan};
+use stonewise::{OutputFolder, PREVIOUS_DIR, PROJECT_STEP, Project, ScansProject, Summary, Until, is_scan};
 use stonewise_core::progress::Progress;
 
 /// Runs a whole project; with `--exit-on` the verdict decides the exit code.
@@ -65,6 +65,8 @@ pub fn run_to(
     until: Until,
     printer: &Printer,
 ) -> Result<(Outcome, Summary)> {
+    // What is missing is better known before the work than after it.
+    tell_of_project(project, printer);
     let summary = measure(folder, project, until, printer)?;
     printer.finish();
     let outcome = match until {
@@ -119,12 +121,23 @@ fn unfinished(out: &Path) -> String {
     }
 }
 
-/// Prints in a few lines what came out; doubts come first, and are printed with `--quiet`, too.
+/// Prints the notes on how the project file was read.
+pub fn tell_of_project(project: &Project, printer: &Printer) {
+    for note in &project.notes {
+        printer.log(&format!("note: {}", note.line()));
+    }
+}
+
+/// Prints in a few lines what came out, except the notes on the project file; doubts come first, and are printed with `--quiet`, too.
 pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
     for doubt in summary.doubts() {
         note(&format!("DOUBT: {}", doubt.line()));
     }
-    for warning in summary.warnings.iter().filter(|w| !w.doubt) {
+    for warning in summary
+        .warnings
+        .iter()
+        .filter(|w| !w.doubt && w.step != PROJECT_STEP)
+    {
         let word = if warning.skipped_input { "skipped" } else { "note" };
         printer.log(&format!("{word}: {}", warning.line()));
     }

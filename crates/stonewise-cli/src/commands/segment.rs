@@ -4,6 +4,7 @@ use crate::args::{ProjectArgs, SegmentArgs};
 use crate::commands::{Outcome, run};
 use crate::counted::counted;
 use crate::printer::Printer;
+use crate::stdout::stdout;
 use anyhow::{Result, bail};
 use std::io::Write;
 use stonewise::segmentation::{FolderJob, MaskEvaluation, require_memory, segment_folder};
@@ -105,7 +106,7 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
         args.out.join("overlays").display()
     ));
     if let Some(evaluation) = &summary.evaluation {
-        write!(std::io::stdout(), "{}", table(evaluation))?;
+        write!(stdout(), "{}", table(evaluation))?;
     }
 
     Ok(if summary.warnings.is_empty() {

@@ -4,10 +4,11 @@ use crate::args::{DemoArgs, Preset, SimulateArgs};
 use crate::commands::{Outcome, run};
 use crate::counted::counted;
 use crate::printer::Printer;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use std::path::Path;
+use stonewise::experiment::not_simulated;
 use stonewise::segmentation;
-use stonewise::{OutputFolder, Owner, Project, Until, require_memory};
+use stonewise::{Error, OutputFolder, Owner, Project, Until, read_toml, require_memory};
 use stonewise_core::progress::Progress;
 use stonewise_simulate::{SurveyParams, SurveySummary, write_survey};
 
@@ -43,7 +44,7 @@ pub fn make_once(path: &Path, params: &SurveyParams, force: bool, printer: &Prin
     let is_there = folder.path().join("stonewise.toml").exists()
         && written.and_then(|t| toml::from_str::<SurveyParams>(&t).ok()) == Some(params.clone());
     if !is_there {
-        write_survey(folder.path(), params, printer)?;
+        write_survey(folder.path(), params, printer).map_err(not_simulated)?;
     }
     Ok(())
 }
@@ -58,18 +59,19 @@ fn claim(path: &Path, params: &SurveyParams, force: bool) -> Result<OutputFolder
 /// is short.
 ///
 /// # Errors
-/// The folder holds other files, memory is short, or [`write_survey`] fails.
+/// A parameter is impossible, the folder holds other files, memory is short, or [`write_survey`] fails.
 pub fn simulate_survey(
     out: &Path,
     params: &SurveyParams,
     force: bool,
     progress: &dyn Progress,
 ) -> Result<SurveySummary> {
+    params.check().map_err(not_simulated)?;
     if !force {
         require_memory(params.memory_bytes(), THIS)?;
     }
     let folder = claim(out, params, force)?;
-    Ok(write_survey(folder.path(), params, progress)?)
+    Ok(write_survey(folder.path(), params, progress).map_err(not_simulated)?)
 }
 
 /// Makes a simulated survey.
@@ -78,9 +80,10 @@ pub fn simulate(args: &SimulateArgs, force: bool, printer: &Printer) -> Result<O
         None if args.preset == Preset::Dam => SurveyParams::dam(args.size),
         None => SurveyParams::default(),
         Some(path) => {
-            let text =
-                std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
-            toml::from_str(&text).with_context(|| path.display().to_string())?
+            let params: SurveyParams = read_toml(path)?;
+            let named = |error| Error::Parameters(format!("{error}: {}", path.display()));
+            params.check().map_err(named)?;
+            params
         }
     };
     if let Some(seed) = args.seed {

@@ -3,6 +3,7 @@
 use crate::args::StudioArgs;
 use crate::commands::Outcome;
 use crate::printer::Printer;
+use crate::stdout::stdout;
 use anyhow::{Context, Result};
 use std::io::Write;
 use std::process::{Command, Stdio};
@@ -13,7 +14,7 @@ use stonewise_studio::Studio;
 pub fn studio(args: &StudioArgs, printer: &Printer) -> Result<Outcome> {
     let studio = Studio::open(&args.place, args.port, args.view)
         .with_context(|| format!("the studio cannot open {}", args.place.display()))?;
-    let mut out = std::io::stdout();
+    let mut out = stdout();
     writeln!(out, "{}", studio.address())?;
     out.flush()?;
     if !args.no_browser {

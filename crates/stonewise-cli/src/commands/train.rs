@@ -4,10 +4,10 @@ use crate::args::TrainArgs;
 use crate::commands::Outcome;
 use crate::counted::counted;
 use crate::printer::Printer;
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-use stonewise::{OutputFolder, Owner};
+use stonewise::{OutputFolder, Owner, read_toml};
 use stonewise_segment::dataset::{LabelledPhotos, PhotoCrops};
 use stonewise_segment::model::MaskRcnnConfig;
 use stonewise_segment::train::{
@@ -32,7 +32,7 @@ struct Config {
 /// Trains, or goes on training, until the time is up.
 pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let config = match &args.config {
-        Some(path) => read_config(path)?,
+        Some(path) => read_toml(path)?,
         None => Config {
             model: MaskRcnnConfig::light(),
             training: None,
@@ -115,9 +115,4 @@ fn tell(photos: &LabelledPhotos, printer: &Printer) {
             photos.unlabelled().len()
         ));
     }
-}
-
-fn read_config(path: &Path) -> Result<Config> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
-    toml::from_str(&text).with_context(|| path.display().to_string())
 }

@@ -3,6 +3,7 @@
 use crate::args::TuneArgs;
 use crate::commands::{Outcome, part::part};
 use crate::printer::Printer;
+use crate::stdout::stdout;
 use anyhow::{Result, bail};
 use std::io::Write;
 use stonewise::experiment::{TuneOptions, tune as tune_grid};
@@ -44,6 +45,6 @@ pub fn tune(args: &TuneArgs, force: bool, printer: &Printer) -> Result<Outcome> 
     }
 
     printer.log(&format!("open {}", args.out.join("index.html").display()));
-    write!(std::io::stdout(), "{}", tuned.lines)?;
+    write!(stdout(), "{}", tuned.lines)?;
     Ok(Outcome::Done)
 }

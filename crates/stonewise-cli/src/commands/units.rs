@@ -2,9 +2,10 @@
 
 use crate::args::{PlanArgs, UnitArgs};
 use crate::commands::Outcome;
-use crate::commands::run::conclude;
+use crate::commands::run::{conclude, tell_of_project};
 use crate::counted::counted;
 use crate::printer::Printer;
+use crate::stdout::stdout;
 use anyhow::Result;
 use serde_json::Map;
 use std::io::Write;
@@ -35,7 +36,7 @@ pub fn plan(args: &PlanArgs, force: bool, printer: &Printer) -> Result<Outcome> 
         counted(plan.units.len(), "unit")
     ));
     if !text.is_empty() {
-        writeln!(std::io::stdout(), "{text}")?;
+        writeln!(stdout(), "{text}")?;
     }
     Ok(Outcome::Done)
 }
@@ -48,7 +49,10 @@ pub fn unit(args: &UnitArgs, printer: &Printer) -> Result<Outcome> {
         printer.log(&format!("{} was done", args.unit));
     }
     Ok(match &done.summary {
-        Some(summary) => conclude(&done.project, summary, &args.out, printer),
+        Some(summary) => {
+            tell_of_project(&done.project, printer);
+            conclude(&done.project, summary, &args.out, printer)
+        }
         None => Outcome::Done,
     })
 }

@@ -3,6 +3,7 @@
 use crate::args::VerifyArgs;
 use crate::commands::Outcome;
 use crate::printer::Printer;
+use crate::stdout::stdout;
 use anyhow::Result;
 use std::io::Write;
 use stonewise::{Answer, Project};
@@ -12,7 +13,7 @@ pub fn verify(args: &VerifyArgs, printer: &Printer) -> Result<Outcome> {
     let project = args.project.as_deref().map(Project::read).transpose()?;
     let verification = stonewise::verify(&args.results, project.as_ref(), printer)?;
     printer.finish();
-    let mut out = std::io::stdout();
+    let mut out = stdout();
     if args.json {
         writeln!(out, "{}", serde_json::to_string_pretty(&verification)?)?;
     } else {

@@ -218,6 +218,8 @@ fn photos_in_e57_files_become_images_and_cameras_of_a_project() {
         log.contains("no images inside") && log.contains("two_scans.e57"),
         "{log}"
     );
+    let (code, _, log) = photos(&testdata("hostile/lie.jpg"));
+    assert!(code == Some(1) && log.contains("not an E57 file"), "{log}");
     assert!(!out.exists());
 
     e57_with_photos(&scan, 0);
@@ -337,7 +339,7 @@ fn a_project_file_that_is_missing_or_no_text_is_wrong_usage() {
     let (code, log) = run(&path);
     assert_eq!(code, Some(2), "{log}");
     assert!(
-        log.contains("stonewise.toml:2: ") && log.contains("save the project file as UTF-8"),
+        log.contains("stonewise.toml:2: ") && log.contains("save the file as UTF-8"),
         "{log}"
     );
 }

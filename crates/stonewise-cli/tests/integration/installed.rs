@@ -1,9 +1,9 @@
 //! What belongs to an installed command: completions, man pages, a look at the machine.
 
-use crate::support::stonewise;
+use crate::support::{program, stonewise};
 use std::collections::BTreeSet;
 use std::fs;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 /// The commands that `--help` lists.
 fn listed() -> BTreeSet<String> {
@@ -21,6 +21,19 @@ fn listed() -> BTreeSet<String> {
         .filter(|l| l.starts_with("  ") && !l.starts_with("   "));
     let names = names.filter_map(|l| l.split_whitespace().next());
     names.filter(|n| *n != "help").map(str::to_owned).collect()
+}
+
+#[test]
+fn a_reader_that_closes_the_output_early_is_no_error() {
+    let mut command = Command::new(program());
+    command
+        .arg("schema")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
 }
 
 #[test]

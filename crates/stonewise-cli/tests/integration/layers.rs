@@ -3,7 +3,7 @@
 
 /// Modules from the bottom up; those on one line do not use each other.
 const LAYERS: [&[&str]; 4] = [
-    &["args", "counted", "note", "steps"],
+    &["args", "counted", "note", "stdout", "steps"],
     &["screen"],
     &["printer"],
     &["commands"],

@@ -129,6 +129,39 @@ fn a_survey_of_another_seed_is_not_replaced() {
     assert_eq!(simulate("2", &["--force"]).0, 0);
 }
 
+#[test]
+fn wrong_parameters_of_a_simulation_are_named_in_a_line_and_leave_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let (params, survey) = (dir.path().join("params.toml"), dir.path().join("survey"));
+    for (text, message) in [
+        ("name = \"x\"\nfoo = 1\n", "params.toml:2: unknown field `foo`"),
+        (
+            "[scene.wall]\nwidth_m = -4\n",
+            "scene.wall.width_m = -4 is not possible",
+        ),
+    ] {
+        fs::write(&params, text).unwrap();
+        let mut command = stonewise();
+        command.args(["simulate", "--params"]).arg(&params);
+        let (code, log) = outcome(command.arg("--out").arg(&survey));
+        assert!(
+            code == 2 && log.contains(message) && log.contains("params.toml") && log.ends_with("]\n"),
+            "{log}"
+        );
+        assert_eq!(log.lines().count(), 1, "{log}");
+        assert!(!survey.exists());
+    }
+    let mut command = stonewise();
+    let missing = dir.path().join("missing.toml");
+    command.args(["simulate", "--params"]).arg(&missing);
+    let (code, log) = outcome(command.arg("--out").arg(&survey));
+    let expected = format!(
+        "error: reading failed: no such file or folder: {} [file-access]\n",
+        missing.display()
+    );
+    assert_eq!((code, log), (1, expected));
+}
+
 /// A limit on the size of files makes writing fail in the middle of a file, as a full disk does: in a tile, in
 /// a table, in the report.
 #[cfg(target_os = "linux")]

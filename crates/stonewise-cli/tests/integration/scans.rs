@@ -155,7 +155,7 @@ fn one_scan_is_wrong_usage_and_other_scans_are_refused() {
     let out = dir.path().join("results");
     let (code, log) = outcome(stonewise().arg("run").arg(&scans[0]).arg("--out").arg(&out));
     assert!(
-        code != 0 && log.contains("a single scan shows no motion"),
+        code == 2 && log.contains("a single scan shows no motion"),
         "{log}"
     );
     fs::create_dir(&out).unwrap();

@@ -339,7 +339,7 @@ fn init_writes_a_project_that_runs_need_no_change_in() {
     ] {
         assert!(text.contains(expected), "{expected} is not in\n{text}");
     }
-    stonewise().arg("init").arg(survey.path()).assert().code(1);
+    stonewise().arg("init").arg(survey.path()).assert().code(2);
     // Without masks a detector is needed.
     let with_model = format!("{text}\n[segment]\nmodel = \"missing.safetensors\"\n");
     fs::write(survey.path().join("stonewise.toml"), with_model).unwrap();

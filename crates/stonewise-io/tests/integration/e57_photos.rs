@@ -402,7 +402,7 @@ fn files_without_photos_say_so() {
     let laz = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/clouds/las12_format3.las");
     let message = unpack(&[laz], &out).unwrap_err();
     assert!(
-        message.contains("at its head") && message.ends_with(".las"),
+        message.contains("not an E57 file") && message.ends_with(".las"),
         "{message}"
     );
 }

@@ -92,11 +92,15 @@ fn time(project: &Project, points: u64, photos: &[[u32; 2]], tile: f64) -> Strin
         false => "",
     };
 
+    let on = match cores {
+        1 => "one core".to_owned(),
+        _ => format!("{cores} cores"),
+    };
     let minutes = |factor: f64| (seconds * factor / 60.0).round().max(1.0);
     let (low, high) = (minutes(1.0 / SPREAD), minutes(SPREAD));
     match low < high {
-        true => format!("{low} to {high} min on {cores} cores{views}"),
-        false => format!("about {low} min on {cores} cores{views}"),
+        true => format!("{low} to {high} min on {on}{views}"),
+        false => format!("about {low} min on {on}{views}"),
     }
 }
 

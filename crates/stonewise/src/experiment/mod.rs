@@ -13,6 +13,7 @@ mod predicted;
 mod quiet;
 mod sensitivity;
 mod settings_with;
+mod simulation;
 mod survey_plan;
 mod tune;
 
@@ -21,6 +22,7 @@ pub use certify::{Certificate, CertifyOptions, Figure, certify};
 pub use design::{Design, design};
 pub use paper::{Detail, PaperOptions, PaperSurvey, PaperTables, Segmented, paper};
 pub use sensitivity::{Influence, SensitivityOptions, SensitivityPoint, sensitivity};
+pub use simulation::not_simulated;
 pub use survey_plan::{
     PlanDesign, PlannedDrone, PlannedInstrument, PlannedPhotos, PlannedRegistration, PlannedStation,
     PlannedSurvey, PlannedTargets, SurveyPlan, Weakest, design_plan,

@@ -76,10 +76,10 @@ fn held(outcome: std::result::Result<(), TryLockError>, folder: &Path, path: &Pa
         Err(TryLockError::WouldBlock) => Err(Error::Busy {
             path: folder.to_path_buf(),
         }),
-        Err(TryLockError::Error(source)) => Err(Error::Io {
+        Err(TryLockError::Error(cause)) => Err(Error::Io {
             action: "locking the results folder (it must lie where files can be locked, such as a local disk)",
             path: path.to_path_buf(),
-            source,
+            cause,
         }),
     }
 }

@@ -17,6 +17,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use stonewise_core::progress::Progress;
 use stonewise_segment::Weights;
 
+/// The step of warnings on how the project file was read.
+pub const PROJECT_STEP: &str = "project";
+
 /// Where a step notes its warnings.
 const WARNINGS: &str = "warnings.json";
 
@@ -91,7 +94,7 @@ impl<'a> Context<'a> {
         create_results_folder(out)?;
         let warnings = Warnings::default();
         for note in &project.notes {
-            warnings.notice("project", project.path.to_string_lossy(), note.as_str());
+            warnings.notice(PROJECT_STEP, project.path.to_string_lossy(), note.clone());
         }
         Ok(Self {
             project,

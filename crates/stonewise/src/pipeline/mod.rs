@@ -20,6 +20,7 @@ mod until;
 
 pub use clouds_only::{Comparison, compare_clouds, tile_clouds};
 pub(crate) use context::Context;
+pub use context::PROJECT_STEP;
 pub(crate) use graph::Run;
 pub(crate) use outputs::verdict::verdict_of_tables;
 pub use run::{PairSummary, Summary, run};

@@ -9,6 +9,7 @@ use crate::args::InfoArgs;
 use crate::commands::Outcome;
 use crate::counted::counted;
 use crate::note::note;
+use crate::stdout::stdout;
 use anyhow::{Result, bail};
 use cloud::cloud;
 use described::Described;
@@ -33,7 +34,7 @@ pub fn info(args: &InfoArgs) -> Result<Outcome> {
     for path in &args.paths {
         match describe(path) {
             Ok(Described { text, .. }) if !args.json => {
-                writeln!(std::io::stdout(), "{}\n{text}", path.display())?;
+                writeln!(stdout(), "{}\n{text}", path.display())?;
             }
             Ok(Described { mut json, .. }) => {
                 json["path"] = json!(path.display().to_string());
@@ -47,7 +48,7 @@ pub fn info(args: &InfoArgs) -> Result<Outcome> {
         }
     }
     if args.json {
-        writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&all)?)?;
+        writeln!(stdout(), "{}", serde_json::to_string_pretty(&all)?)?;
     }
     if unreadable > 0 {
         bail!("{unreadable} of {} cannot be used", args.paths.len());

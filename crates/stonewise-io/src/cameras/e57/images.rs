@@ -8,7 +8,7 @@ use crate::wall::behind_wall;
 use e57::{Blob, E57Reader, Image, PinholeImageProperties, Projection, Transform};
 use nalgebra::{Point3, Quaternion, UnitQuaternion};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::{Camera, Distortion};
 
@@ -46,10 +46,20 @@ pub enum Taken {
 impl E57Images {
     /// Opens a file and reads the descriptions of its images.
     pub fn open(path: &Path) -> Result<Self, CameraError> {
-        let file = File::open(path).map_err(|source| CameraError::Read {
+        let read = |source| CameraError::Read {
             path: path.to_owned(),
             source,
-        })?;
+        };
+        let mut file = File::open(path).map_err(read)?;
+        let mut start = Vec::new();
+        (&mut file).take(8).read_to_end(&mut start).map_err(read)?;
+        if start != *b"ASTM-E57" {
+            return Err(CameraError::NoImages {
+                files: path.display().to_string(),
+                problem: "not an E57 file; only E57 files can hold photos".to_owned(),
+            });
+        }
+        file.rewind().map_err(read)?;
         let reader = guarded(path, "its header", || E57Reader::new(BufReader::new(file)))?;
         Ok(Self {
             path: path.to_owned(),

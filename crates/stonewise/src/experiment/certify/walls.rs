@@ -4,6 +4,7 @@ use super::certificate::{CertifyOptions, Figure};
 use crate::error::{Error, Result};
 use crate::experiment::quiet::Quiet;
 use crate::experiment::sensitivity::base;
+use crate::experiment::simulation::not_simulated;
 use crate::pipeline::{Context, Until, run_in};
 use crate::project::Project;
 use crate::storage::step::Key;
@@ -153,7 +154,7 @@ fn measured(
     let key = Key::new("survey", &params, &[]);
     let (dir, _) = store.step("survey", key, &[], |dir| {
         let written = write_survey(&dir.file("survey"), &params, &quiet);
-        written.map(drop).map_err(|e| Error::Survey(e.to_string()))
+        written.map(drop).map_err(not_simulated)
     })?;
     let survey = dir.file("survey");
     let project = Project::read(&survey.join("stonewise.toml"))?;

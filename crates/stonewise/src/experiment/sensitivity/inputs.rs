@@ -2,6 +2,7 @@
 
 use super::cases::{Change, Variant, changed};
 use crate::error::{Error, Result};
+use crate::experiment::simulation::not_simulated;
 use crate::files::{read_json, write_json};
 use crate::project::Project;
 use crate::storage::step::Key;
@@ -14,7 +15,7 @@ use stonewise_core::progress::Progress;
 use stonewise_io::cameras::{read_cameras, write_metashape};
 use stonewise_io::masks::{MaskSource, write_label_png};
 use stonewise_simulate::{
-    MaskError, PhotoParams, SimulateError, SurveyParams, disturb_views, mean_iou, spoil_masks, write_survey,
+    MaskError, PhotoParams, SurveyParams, disturb_views, mean_iou, spoil_masks, write_survey,
 };
 
 /// What a variant is measured on.
@@ -82,13 +83,6 @@ pub(super) fn inputs(
         truth: folder.join("truth/stones.csv"),
         x,
     })
-}
-
-fn not_simulated(error: SimulateError) -> Error {
-    match error {
-        SimulateError::Interrupted(_) => Error::Interrupted,
-        error => Error::Simulate(error.into()),
-    }
 }
 
 fn cameras_name(number: u64) -> String {

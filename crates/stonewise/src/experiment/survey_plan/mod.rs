@@ -14,6 +14,7 @@ mod values;
 use crate::error::{Error, Result};
 use crate::experiment::predicted::{limits_mm, medians_mm, without_chance};
 use crate::experiment::quiet::Quiet;
+use crate::experiment::simulation::not_simulated;
 use crate::files::{write_readable_json, write_text};
 use crate::pipeline::{Context, Run, Until};
 use crate::project::Project;
@@ -31,8 +32,7 @@ use std::sync::Arc;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::progress::Progress;
 use stonewise_simulate::{
-    MaskFiles, PhotoParams, SceneParams, SimulateError, SurroundingsParams, SurveyParams, TlsParams, Wall,
-    write_survey,
+    MaskFiles, PhotoParams, SceneParams, SurroundingsParams, SurveyParams, TlsParams, Wall, write_survey,
 };
 
 /// How far a station may stand off its planned place, metres.
@@ -90,10 +90,7 @@ fn survey(
     let params = simulation(plan, seed);
     let (dir, _) = store.step("survey", Key::new("survey", &params, &[]), &[], |dir| {
         let written = write_survey(&dir.file("survey"), &params, &quiet);
-        written.map(drop).map_err(|error| match error {
-            SimulateError::Interrupted(_) => Error::Interrupted,
-            error => Error::Simulate(error.into()),
-        })
+        written.map(drop).map_err(not_simulated)
     })?;
     let project = project(plan, &dir.file("survey"))?;
     let folder = out.join(&name);

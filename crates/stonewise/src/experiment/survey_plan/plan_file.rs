@@ -3,6 +3,7 @@
 use super::flights::{PlannedDrone, PlannedPhotos};
 use super::values::{not_negative, positive};
 use crate::error::{Error, Result};
+use crate::files::read_toml;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -166,13 +167,9 @@ impl SurveyPlan {
     /// The file cannot be read, is no TOML, or holds a key that is not known or a value that cannot be; the error names the
     /// key and the fix.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(Error::io("reading the plan", path))?;
-        let input = |message: String| Error::Input {
-            path: path.to_owned(),
-            message,
-        };
-        let plan: Self = toml::from_str(&text).map_err(|e| input(e.to_string()))?;
-        plan.check().map_err(input)?;
+        let plan: Self = read_toml(path)?;
+        plan.check()
+            .map_err(|message| Error::Parameters(format!("{message}: {}", path.display())))?;
         Ok(plan)
     }
 

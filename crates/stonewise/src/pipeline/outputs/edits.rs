@@ -5,6 +5,8 @@ use crate::files::write_readable_json;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::edit::Edited;
 use crate::results::names::{EDITS_AUDIT, FACADE};
+use crate::texts::Said;
+use crate::texts::notices::EDIT_WITHOUT_EFFECT;
 use stonewise_core::transfer::{EditEffect, NoEffect};
 use stonewise_io::table::{Table, write_csv};
 
@@ -26,7 +28,7 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
         for (epoch, effects) in context.project.epochs.iter().zip(&edited.effects) {
             let Some(effect) = &effects[index] else { continue };
             if let Err(reason) = effect {
-                reasons.push(format!("{}: {reason}", epoch.name));
+                reasons.push((&epoch.name, Said::from(reason)));
             }
             rows.push((index, epoch.name.clone(), effect));
         }
@@ -35,7 +37,18 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
             .iter()
             .any(|epoch| matches!(epoch[index], Some(Ok(_))));
         if !has_effect {
-            let message = format!("{} has no effect; {}", edit.action.word(), reasons.join("; "));
+            let listed = |said: fn(&Said) -> &str| {
+                let texts = reasons
+                    .iter()
+                    .map(|(epoch, reason)| format!("{epoch}: {}", said(reason)));
+                texts.collect::<Vec<_>>().join("; ")
+            };
+            let reasons = Said {
+                german: Some(listed(Said::in_german)),
+                ..listed(|said| &said.english).into()
+            };
+            let words = [("edit", edit.action.word().into()), ("reasons", reasons)];
+            let message = EDIT_WITHOUT_EFFECT.say(&words);
             context.warnings.skipped("edit", file.place(index), message);
         }
     }

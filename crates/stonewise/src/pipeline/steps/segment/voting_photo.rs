@@ -91,16 +91,21 @@ pub fn posed_photos(epoch: &Epoch, warnings: &Warnings) -> Result<Vec<(View, Pat
             CAMERA_NOT_USED.say(&[("reason", reason.into())]),
         );
     }
-    let mut posed = Vec::new();
+    let (mut posed, mut missing) = (Vec::new(), Vec::new());
     for (view, path) in cameras.views.into_iter().zip(photos.paths) {
         match path {
             Some(path) => posed.push((view, path)),
-            None => warnings.notice(
-                STEP,
-                view.name,
-                NO_SUCH_PHOTO.say(&[("folder", (&*files.images.to_string_lossy()).into())]),
-            ),
+            None => missing.push(view.name),
         }
+    }
+    // A camera file for several epochs names the photos of all of them: one note for those of other epochs.
+    if let Some(first) = missing.first() {
+        let words = [
+            ("n", missing.len().to_string().into()),
+            ("folder", (&*files.images.to_string_lossy()).into()),
+            ("name", first.as_str().into()),
+        ];
+        warnings.notice(STEP, file, NO_SUCH_PHOTO.say(&words));
     }
     Ok(posed)
 }
