@@ -43,7 +43,7 @@ pub enum Error {
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// The system's error, which the message holds.
+        /// The system's error; part of the message, so not a `source`.
         cause: std::io::Error,
     },
     /// An input cannot be used.
@@ -216,8 +216,8 @@ impl From<AdjustError<Error>> for Error {
 }
 
 impl Error {
-    /// Whether the command was used wrongly: an invalid project file, invalid parameters or a file of them, or an output folder
-    /// that belongs to something else.
+    /// Whether the command was used wrongly: an invalid project or parameter file, invalid parameters, or an output
+    /// folder that belongs to something else.
     pub fn is_wrong_usage(&self) -> bool {
         matches!(
             self,
@@ -302,7 +302,7 @@ impl Error {
     }
 }
 
-/// What could not be done, and why, without the number and the capitals of the system's error where a file is missing.
+/// What failed, and why; a missing file in plain words instead of the system's.
 fn failed(action: &str, cause: &std::io::Error) -> String {
     match cause.kind() {
         ErrorKind::NotFound => format!("{action} failed: no such file or folder"),

@@ -74,7 +74,7 @@ pub fn read_parameters(path: &Path) -> Result<String> {
 /// Reads parameters from a file in TOML.
 ///
 /// # Errors
-/// The file cannot be read; with the line: it is no TOML, or holds a key that is not known or a value of another kind.
+/// The file cannot be read; with the line: it is not TOML, or holds an unknown key or a value of the wrong type.
 pub fn read_toml<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
     let text = read_parameters(path)?;
     toml::from_str(&text).map_err(|e| Error::toml(path, &text, &e))

@@ -26,7 +26,7 @@ use std::io::Write;
 const DONE: u8 = 0;
 /// Something failed.
 const FAILED: u8 = 1;
-/// Wrong arguments, or a wrong project file or other file of parameters.
+/// Wrong arguments, or a wrong project or parameter file.
 const WRONG_USAGE: u8 = 2;
 /// Finished, but some inputs were left out, or the results as a whole are in doubt.
 const IN_DOUBT: u8 = 3;

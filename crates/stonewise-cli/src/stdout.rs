@@ -2,7 +2,7 @@
 
 use std::io::{ErrorKind, Result, Stdout, Write};
 
-/// Standard output. A reader that closes it early, as `head` does, is no reason to fail.
+/// Standard output, which a reader may close early, as `head` does, without an error.
 pub fn stdout() -> impl Write {
     UntilClosed(std::io::stdout())
 }

@@ -2,6 +2,9 @@
 
 use rayon::prelude::*;
 
+/// Most items that are prepared at a time, so that memory does not grow with the threads of large machines.
+const AHEAD: usize = 8;
+
 /// The work was stopped by the caller before it was done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("interrupted")]
@@ -67,11 +70,12 @@ impl dyn Progress + '_ {
         Ok(())
     }
 
-    /// Does a piece of work item by item, in two parts: prepares as many items at a time as there are threads, then
-    /// takes what was prepared one after the other, in order, as [`Self::each`] does. Memory: the prepared items.
+    /// Does a piece of work item by item, in two parts: `prepare` runs on as many items at a time as there are
+    /// threads, eight at most, then `take` gets the results one by one, in order. Looks before each whether to
+    /// stop, and advances after it. Memory: one prepared item a thread.
     ///
     /// # Errors
-    /// The work on an item failed, or the caller stopped it.
+    /// The work on an item failed (of several, the first in order), or the caller stopped it.
     pub fn each_prepared<I, T, E>(
         &self,
         what: &str,
@@ -86,12 +90,12 @@ impl dyn Progress + '_ {
     {
         let items: Vec<I::Item> = items.into_iter().collect();
         self.begin(what, items.len() as u64);
-        for group in items.chunks(rayon::current_num_threads()) {
+        for group in items.chunks(rayon::current_num_threads().min(AHEAD)) {
             self.check()?;
-            let prepared = group.par_iter().map(|item| prepare(*item));
-            for (item, prepared) in group.iter().zip(prepared.collect::<Result<Vec<T>, E>>()?) {
+            let prepared: Vec<Result<T, E>> = group.par_iter().map(|item| prepare(*item)).collect();
+            for (item, prepared) in group.iter().zip(prepared) {
                 self.check()?;
-                take(*item, prepared)?;
+                take(*item, prepared?)?;
                 self.advance(1);
             }
         }
@@ -107,5 +111,44 @@ impl Progress for Silent {
     fn advance(&self, _units: u64) {}
     fn is_cancelled(&self) -> bool {
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prepared_items_are_taken_in_order_and_the_first_error_ends_the_work() {
+        let squares = |wrong: &'static [u64]| {
+            let progress: &dyn Progress = &Silent;
+            let mut taken = Vec::new();
+            let square = |i: u64| match wrong.contains(&i) {
+                true => Err(Failed::At(i)),
+                false => Ok(i * i),
+            };
+            let result = progress.each_prepared("squares", 0..50, square, |i, square| {
+                taken.push((i, square));
+                Ok(())
+            });
+            (result, taken)
+        };
+        let all: Vec<(u64, u64)> = (0..50).map(|i| (i, i * i)).collect();
+        stonewise_testing::on_threads(3, || {
+            assert_eq!(squares(&[]), (Ok(()), all.clone()));
+            assert_eq!(squares(&[20, 19]), (Err(Failed::At(19)), all[..19].to_vec()));
+        });
+    }
+
+    #[derive(Debug, PartialEq)]
+    enum Failed {
+        At(u64),
+        Stopped,
+    }
+
+    impl From<Interrupted> for Failed {
+        fn from(_: Interrupted) -> Self {
+            Self::Stopped
+        }
     }
 }

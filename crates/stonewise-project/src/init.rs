@@ -80,7 +80,7 @@ pub fn init(dir: &Path) -> Result<Initialised> {
     if path.exists() {
         return Err(Error::Output {
             path,
-            message: "there is a project file already; remove it to start anew".into(),
+            message: "a project file already exists; remove it to start over".into(),
         });
     }
     let Proposal { text, lines } = propose(dir)?;

@@ -31,7 +31,7 @@ impl ScansProject {
         let path = dir.join("stonewise.toml");
         if let [only] = scans {
             return Err(Error::Parameters(format!(
-                "a single scan shows no motion: name those of two epochs, or more, in order of time: {}",
+                "a single scan shows no motion; name the scans of two or more epochs, in order of time: {}",
                 only.display()
             )));
         }
@@ -68,7 +68,7 @@ impl ScansProject {
 
 fn text_of(scans: &[PathBuf]) -> String {
     let mut text = String::from(
-        "# Written by `stonewise run`; edits stay. All keys: `stonewise schema`.\n[project]\nname = \"scans\"\n",
+        "# Written by `stonewise run`; your changes are kept. All keys: `stonewise schema`.\n[project]\nname = \"scans\"\n",
     );
     for (name, scan) in names(scans).iter().zip(scans) {
         let scan = quoted(&scan.to_string_lossy());

@@ -5,26 +5,26 @@ use super::message::{Message, messages};
 messages! {
     NOTICES {
         EPOCHS_NUMBERED = "epochs-numbered":
-            "motions count from epoch \"{name}\"; in the results the epochs are numbered {numbered}",
-            "Bewegungen zählen ab Epoche „{name}“; in den Ergebnissen sind die Epochen so nummeriert: {numbered}";
+            "motions are relative to epoch \"{name}\"; the results number the epochs {numbered}",
+            "Bewegungen gelten gegenüber Epoche „{name}“; in den Ergebnissen haben die Epochen die Nummern {numbered}";
 
         EPOCH_WITHOUT_DATE = "missing-condition":
-            "epoch \"{name}\" has no date, so nothing in {file} belongs to it: give it one",
-            "Epoche „{name}“ hat kein Datum, daher gehört nichts in {file} zu ihr; ein Datum angeben";
+            "epoch \"{name}\" has no date and gets no conditions from {file}: add its date",
+            "Epoche „{name}“ hat kein Datum und bekommt keine Werte aus {file}: ihr Datum angeben";
 
         CONDITION_BETWEEN = "missing-condition":
-            "{file}: no {name} on {date}: its readings before and after lie {days} days apart, more than \
+            "{file}: no {name} on {date}: the readings before and after are {days} days apart, more than \
             conditions.longest_gap_days = {longest}",
-            "{file}: kein {name} am {date}: die Ablesungen davor und danach liegen {days} Tage auseinander, mehr als \
+            "{file}: kein Wert für {name} am {date}: die Ablesungen davor und danach liegen {days} Tage auseinander, mehr als \
             conditions.longest_gap_days = {longest}";
 
         CONDITION_BEFORE = "missing-condition":
-            "{file}: no {name} on {date}, which lies before its readings; nothing is extrapolated",
-            "{file}: kein {name} am {date}: der Tag liegt vor der ersten Ablesung; es wird nicht extrapoliert";
+            "{file}: no {name} on {date}, which is before its readings begin; nothing is extrapolated",
+            "{file}: kein Wert für {name} am {date}: der Tag liegt vor der ersten Ablesung; es wird nicht extrapoliert";
 
         CONDITION_AFTER = "missing-condition":
-            "{file}: no {name} on {date}, which lies after its readings; nothing is extrapolated",
-            "{file}: kein {name} am {date}: der Tag liegt nach der letzten Ablesung; es wird nicht extrapoliert";
+            "{file}: no {name} on {date}, which is after its readings end; nothing is extrapolated",
+            "{file}: kein Wert für {name} am {date}: der Tag liegt nach der letzten Ablesung; es wird nicht extrapoliert";
 
         EDIT_WITHOUT_EFFECT = "edit-without-effect":
             "{edit} has no effect; {reasons}",

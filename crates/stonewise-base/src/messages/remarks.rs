@@ -47,7 +47,7 @@ impl From<&NoEffect> for Said {
             NoEffect::NoStone { at } => {
                 format!("kein Stein bei ({:.2}; {:.2}) m", at.x, at.y).replace('.', ",")
             }
-            NoEffect::OneStone { stone } => format!("nennt nur einen Stein, {stone}"),
+            NoEffect::OneStone { stone } => format!("nennt nur einen einzigen Stein: {stone}"),
             NoEffect::NotCrossed => "die Linie quert keinen Stein von Rand zu Rand".to_owned(),
             NoEffect::SmallPart {
                 stone,

@@ -65,7 +65,7 @@ pub fn run_to(
     until: Until,
     printer: &Printer,
 ) -> Result<(Outcome, Summary)> {
-    // What is missing is better known before the work than after it.
+    // Said before the work, so that what is missing can still be added.
     tell_of_project(project, printer);
     let summary = measure(folder, project, until, printer)?;
     printer.finish();
@@ -128,7 +128,7 @@ pub fn tell_of_project(project: &Project, printer: &Printer) {
     }
 }
 
-/// Prints in a few lines what came out, except the notes on the project file; doubts come first, and are printed with `--quiet`, too.
+/// Prints in a few lines what came out, without the notes on the project file. Doubts come first, also with `--quiet`.
 pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
     for doubt in summary.doubts() {
         note(&format!("DOUBT: {}", doubt.line()));

@@ -58,7 +58,7 @@ impl Atoms {
     fn joined(self) -> Self {
         let mut order: Vec<u32> = (0..self.areas.len() as u32).collect();
         let atom = |i: &u32| self.get(*i as usize);
-        // A stable sort: sums run from cell to cell for any number of threads.
+        // A stable sort: sums run from cell to cell and from tile to tile for any number of threads.
         order.par_sort_by(|a, b| keys(atom(a).sightings).cmp(keys(atom(b).sightings)));
         let mut joined = Self::default();
         for equal in order.chunk_by(|a, b| keys(atom(a).sightings).eq(keys(atom(b).sightings))) {

@@ -1,9 +1,9 @@
 //! From instances in photos to stones in the point cloud.
 //!
 //! Every point is projected into every photo that can see it; instances of different photos that cover the
-//! same surface become one stone; the majority of the photos decides about each point. Three passes over the
-//! cloud: depth maps, overlaps of instances, labels. Memory holds as many tiles as there are threads, all depth
-//! maps (bounded by a parameter), the masks as runs and the atoms, never the survey.
+//! same surface become one stone; the majority of the photos decides about each point. Four passes over the
+//! cloud: surface, depth maps, overlaps of instances, labels. Memory holds a tile a thread, all depth maps
+//! (bounded by a parameter), the masks as runs and the atoms, never the survey.
 //!
 //! Limits: a photo that looks at the back of a wall whose back is not in the cloud would see its front's
 //! points; leave such photos without masks.

@@ -11,7 +11,7 @@ use crate::raster::{RangeImage, ReliefMap};
 ///
 /// Points behind the nearest surface are left out, with the depth map and the tolerance that
 /// [`super::transfer_labels`] uses. Cost: three passes over the tiles that the photo may show; memory holds
-/// one of them and the depth map.
+/// one of them a thread and the depth map.
 ///
 /// # Errors
 /// A tile cannot be read, a parameter cannot have its value, or the caller stopped it.

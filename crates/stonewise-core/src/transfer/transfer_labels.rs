@@ -67,7 +67,7 @@ pub struct Transfer {
 /// photos; merged and fragmented instances by the majority; each point by a vote weighted with ground
 /// sampling distance and incidence.
 ///
-/// Cost: three passes over the tiles; each point is projected into the photos whose cone touches its surface
+/// Cost: four passes over the tiles; each point is projected into the photos whose cone touches its surface
 /// cell.
 ///
 /// # Errors
@@ -98,7 +98,7 @@ where
     )
 }
 
-/// The photos after the first two passes, ready to label any tile.
+/// The photos after all passes but the last, ready to label any tile.
 ///
 /// [`transfer_labels`] in pieces: [`Self::new`] once, [`Self::label`] for ranges of tiles, and
 /// [`finish_transfer`] once all tiles are labelled. Between these, [`Self::election`] and the depth maps and

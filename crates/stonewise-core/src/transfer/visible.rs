@@ -22,8 +22,8 @@ pub(super) struct VisiblePoint {
 /// Calls `visit` with each tile that a photo may show and the points of it that it sees, tile by tile.
 ///
 /// Points behind the nearest surface are left out, with the depth map and the tolerance that
-/// [`super::transfer_labels`] uses. Cost: three passes over these tiles; memory holds one of them and the
-/// depth map.
+/// [`super::transfer_labels`] uses. Cost: three passes over these tiles; memory holds one of them a thread
+/// and the depth map.
 ///
 /// # Errors
 /// A tile cannot be read, a parameter cannot have its value, the caller stopped it, or `visit` failed.

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use stonewise_simulate::SimulateError;
 
-/// Why a survey was not simulated, as an error of this crate: an impossible parameter is one of the user's.
+/// An error of the simulator as one of this crate; an impossible parameter is wrong usage.
 pub fn not_simulated(error: SimulateError) -> Error {
     match error {
         SimulateError::Interrupted(_) => Error::Interrupted,

@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use stonewise_core::progress::Progress;
 use stonewise_segment::Weights;
 
-/// The step of warnings on how the project file was read.
+/// Step under which notes on the project file are recorded.
 pub const PROJECT_STEP: &str = "project";
 
 /// Where a step notes its warnings.

@@ -171,7 +171,8 @@ impl TileSource for DiskTiles {
         let cached = |queue: &VecDeque<(usize, Arc<Cloud>)>| {
             queue.iter().find(|e| e.0 == tile).map(|e| Arc::clone(&e.1))
         };
-        if let Some(cloud) = cached(&self.cache.lock().unwrap_or_else(PoisonError::into_inner)) {
+        let found = cached(&self.cache.lock().unwrap_or_else(PoisonError::into_inner));
+        if let Some(cloud) = found {
             return Ok((*cloud).clone());
         }
         let entry = &self.tiles[tile];

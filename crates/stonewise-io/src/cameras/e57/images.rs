@@ -56,7 +56,7 @@ impl E57Images {
         if start != *b"ASTM-E57" {
             return Err(CameraError::NoImages {
                 files: path.display().to_string(),
-                problem: "not an E57 file; only E57 files can hold photos".to_owned(),
+                problem: "not an E57 file; photos are read from E57 files only".to_owned(),
             });
         }
         file.rewind().map_err(read)?;

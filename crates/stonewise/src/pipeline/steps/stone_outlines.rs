@@ -26,7 +26,7 @@ pub fn make_outlines(context: &Context, first: &Labelled, name: &str) -> Result<
 }
 
 /// The outlines of an epoch's stones. Cost: one pass over all tiles and one more over their labels; memory holds
-/// the points of the stones that further tiles continue.
+/// a tile a thread, and the points of the stones that further tiles continue.
 pub fn stone_outlines(context: &Context, first: &Labelled) -> Result<Vec<StoneOutline>> {
     let tiles = &first.ingested.tiles;
     let mut last_tiles: BTreeMap<u32, usize> = BTreeMap::new();

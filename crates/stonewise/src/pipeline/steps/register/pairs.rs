@@ -174,8 +174,10 @@ impl DiskPairs {
         };
         let all = 0..tiles.tile_count();
         progress.each_prepared("gather stones", all, records, |_, records| {
-            let mut records = records.iter();
-            records.try_for_each(|(batch, records)| spill.push(*batch, records).map(drop))
+            for (batch, records) in &records {
+                spill.push(*batch, records)?;
+            }
+            Ok(())
         })
     }
 }

@@ -59,8 +59,8 @@ struct Boxed {
 }
 
 impl DiskPhotos {
-    /// Cuts out what the photos of both epochs show of the matched stones, one photo at a time. `None` where
-    /// an epoch has none.
+    /// Cuts out what the photos of both epochs show of the matched stones. `None` where an epoch has none.
+    /// Memory: a photo a thread, and what is cut out of it.
     pub fn gather(
         context: &Context,
         photos: Pair<&Segmented>,
@@ -116,8 +116,10 @@ impl DiskPhotos {
         context
             .progress
             .each_prepared("cut stones out of photos", all, chips, |_, chips| {
-                let mut chips = chips.iter();
-                chips.try_for_each(|(batch, chip)| spill.push(*batch, chip).map(drop))
+                for (batch, chip) in &chips {
+                    spill.push(*batch, chip)?;
+                }
+                Ok(())
             })?;
         Ok(Some(Self {
             photos: list,
@@ -146,7 +148,7 @@ fn camera(view: &View, labelled: &Labelled) -> Box<dyn PhotoCamera> {
     }
 }
 
-/// The boxes of all pairs, and how many each batch holds.
+/// The boxes of all pairs, and how many each batch holds. Memory: a batch a thread.
 fn boxes(pairs: &DiskPairs) -> Result<(Vec<Boxed>, Vec<usize>)> {
     let of_batch = |batch: usize| -> Result<(Vec<Option<Boxed>>, usize)> {
         let loaded = pairs.load(batch)?;

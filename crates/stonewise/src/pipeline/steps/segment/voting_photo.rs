@@ -98,7 +98,7 @@ pub fn posed_photos(epoch: &Epoch, warnings: &Warnings) -> Result<Vec<(View, Pat
             None => missing.push(view.name),
         }
     }
-    // A camera file for several epochs names the photos of all of them: one note for those of other epochs.
+    // A camera file for several epochs names the photos of all of them, so those missing here share one note.
     if let Some(first) = missing.first() {
         let words = [
             ("n", missing.len().to_string().into()),
