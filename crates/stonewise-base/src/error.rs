@@ -2,7 +2,6 @@
 
 use std::convert::Infallible;
 use std::io::ErrorKind;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use stonewise_core::change::CompareError;
 use stonewise_core::progress::Interrupted;
@@ -275,7 +274,12 @@ impl Error {
 
     /// Turns an error of the TOML parser into an error of one line that names the file and the line in it.
     pub fn toml(path: &Path, text: &str, error: &toml::de::Error) -> Self {
-        Self::in_text(path, text, error.span(), Self::toml_message(error))
+        Self::in_text(
+            path,
+            text,
+            error.span().map_or(0, |span| span.start),
+            Self::toml_message(error),
+        )
     }
 
     /// The message of the TOML parser in one line.
@@ -283,12 +287,11 @@ impl Error {
         error.message().trim().replace('\n', "; ")
     }
 
-    /// What is wrong with a part of a file's text, or with all of it.
-    pub fn in_text(path: &Path, text: &str, part: Option<Range<usize>>, message: String) -> Self {
-        let before = text.get(..part.map_or(0, |part| part.start));
+    /// What is wrong at a place of a file's text, counted in bytes.
+    pub fn in_text(path: &Path, text: &str, place: usize, message: String) -> Self {
         Self::Project {
             path: path.to_path_buf(),
-            line: before.unwrap_or("").matches('\n').count() + 1,
+            line: text.get(..place).unwrap_or("").matches('\n').count() + 1,
             message,
         }
     }

@@ -67,7 +67,7 @@ pub fn read_parameters(path: &Path) -> Result<String> {
         let start = e.utf8_error().valid_up_to();
         let text = String::from_utf8_lossy(e.as_bytes());
         let message = "a character that is not in UTF-8: save the file as UTF-8".to_owned();
-        Error::in_text(path, &text, Some(start..start), message)
+        Error::in_text(path, &text, start, message)
     })
 }
 

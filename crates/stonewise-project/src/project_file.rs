@@ -360,7 +360,7 @@ struct Source<'a> {
 
 impl Source<'_> {
     fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
-        Error::in_text(self.path, self.text, Some(span), message.into())
+        Error::in_text(self.path, self.text, span.start, message.into())
     }
 
     /// Where a value stands, or else the innermost table that is there. `path`: keys, and numbers in arrays.

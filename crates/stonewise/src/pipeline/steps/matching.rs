@@ -60,7 +60,7 @@ fn survey(context: &Context, epoch: &Labelled) -> Result<(CellSet<Cell>, Footpri
     let mut last = None;
     let mut footprints = Footprints::new();
     let tiles = &epoch.ingested.tiles;
-    let load = |tile| -> Result<_> { Ok((tiles.load(tile)?, epoch.labels(tile)?)) };
+    let load = |tile| epoch.points(tile);
     let take = |_, (cloud, labels): (Cloud, TileLabels)| {
         for i in (0..cloud.len()).filter(|&i| labels.seen[i]) {
             let place = cloud.world(i);

@@ -41,7 +41,7 @@ pub fn stone_outlines(context: &Context, first: &Labelled) -> Result<Vec<StoneOu
     let mut points: BTreeMap<u32, Vec<Point3<f64>>> = BTreeMap::new();
     let mut outlines: BTreeMap<u32, StoneOutline> = BTreeMap::new();
     let all = 0..tiles.tile_count();
-    let load = |tile| -> Result<_> { Ok((tiles.load(tile)?, first.labels(tile)?)) };
+    let load = |tile| first.points(tile);
     let take = |tile, (cloud, labels): (Cloud, TileLabels)| {
         for (i, &stone) in labels.stone.iter().enumerate().filter(|(_, s)| **s != 0) {
             points.entry(stone).or_default().push(cloud.world(i));

@@ -21,7 +21,7 @@ pub use disk_labels::DiskLabels;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use step_key::{label_key, label_name};
-use stonewise_core::cloud::TileSource;
+use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::epoch::EpochId;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
@@ -157,11 +157,16 @@ impl Labelled {
         self.store.read(tile)
     }
 
+    /// A tile's points and their labels.
+    pub fn points(&self, tile: usize) -> Result<(Cloud, TileLabels)> {
+        Ok((self.ingested.tiles.load(tile)?, self.labels(tile)?))
+    }
+
     /// Boxes around the points of all stones. Cost: one pass over all tiles.
     pub fn extents(&self, progress: &dyn Progress) -> Result<StoneExtents> {
         let tiles = &self.ingested.tiles;
         let mut extents = StoneExtents::default();
-        let load = |tile| -> Result<_> { Ok((tiles.load(tile)?, self.labels(tile)?)) };
+        let load = |tile| self.points(tile);
         progress.each_prepared(
             "find stones",
             0..tiles.tile_count(),
