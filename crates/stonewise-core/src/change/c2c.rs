@@ -1,6 +1,6 @@
 //! Cloud to cloud distances.
 
-use crate::cloud::GridIndex;
+use crate::cloud::{Candidates, GridIndex};
 use nalgebra::Point3;
 use rayon::prelude::*;
 
@@ -9,27 +9,32 @@ use rayon::prelude::*;
 /// Unsigned, and never smaller than the reference's spacing allows: points that lie between reference points
 /// are some way off even without change. Cost: points x reference points within the distance found.
 pub fn c2c(reference: &GridIndex, points: &[Point3<f64>], max_m: f64) -> Vec<Option<f64>> {
-    let distance = |p: &Point3<f64>| reference.nearest(p, max_m).map(|(_, d2)| d2.sqrt());
-    if is_ordered(reference, points) {
-        return points.par_iter().map(distance).collect();
-    }
+    let is_ordered = is_ordered(reference, points);
+    let mut order: Vec<u32> = (0..points.len() as u32).collect();
+    let place = |i: &u32| reference.place_of(&points[*i as usize]);
     // Points in no order wait for memory at every search; sorted by their place they do not.
-    let mut order: Vec<(u32, u32)> = (0..)
-        .zip(points)
-        .map(|(i, p)| (reference.block_of(p), i))
-        .collect();
-    order.sort_unstable();
-    let found: Vec<Option<f64>> = order
-        .par_iter()
-        .map(|(_, i)| distance(&points[*i as usize]))
-        .collect();
+    if !is_ordered {
+        order.par_sort_by_cached_key(place);
+    }
+    let of_chunk = |order: &mut [u32]| {
+        if is_ordered {
+            order.sort_by_cached_key(place);
+        }
+        let mut candidates = Candidates::new(reference);
+        let mut of_point = |i: u32| (i, candidates.nearest(&points[i as usize], max_m).map(f64::sqrt));
+        order.iter().map(|i| of_point(*i)).collect::<Vec<_>>()
+    };
+    let found: Vec<Vec<(u32, Option<f64>)>> = order.par_chunks_mut(CHUNK).map(of_chunk).collect();
     let mut distances = vec![None; points.len()];
-    for ((_, i), found) in order.iter().zip(found) {
-        distances[*i as usize] = found;
+    for (i, distance) in found.into_iter().flatten() {
+        distances[i as usize] = distance;
     }
     distances
 }
 
+/// Points of which a thread finds the distances cube by cube: some columns of a scanner, and few enough that they stay in
+/// the processor's cache.
+const CHUNK: usize = 16_384;
 /// Pairs of consecutive points that show whether points come in an order.
 const ORDER_SAMPLES: usize = 1000;
 
@@ -38,7 +43,7 @@ fn is_ordered(reference: &GridIndex, points: &[Point3<f64>]) -> bool {
     let pairs = points.windows(2).step_by(points.len() / ORDER_SAMPLES + 1);
     let (mut near, mut all) = (0, 0);
     for pair in pairs {
-        let [a, b] = [0, 1].map(|i| i64::from(reference.block_of(&pair[i])));
+        let [a, b] = [0, 1].map(|i| i64::from(reference.place_of(&pair[i]).0));
         near += usize::from((a - b).abs() <= 1);
         all += 1;
     }

@@ -23,6 +23,8 @@ pub struct GridIndex {
 /// First radius of a search for the nearest point, in cells: around a point of the same cloud it finds one in
 /// 96 of 100 cases where a cell holds four points of a surface, in at most eight cells.
 const FIRST_RADIUS_CELLS: f64 = 0.5;
+/// Cells along the edge of a cube whose points share their candidates for the nearest point.
+const CUBE_CELLS: usize = 2;
 /// Points of a surface that a cell holds where [`GridIndex::for_nearest`] chooses it: fewer cost more cells a
 /// search, more cost more distances.
 const POINTS_PER_CELL: f64 = 4.0;
@@ -160,6 +162,27 @@ impl GridIndex {
         }
     }
 
+    /// The cube of cells around a point in which it shares its candidates with its neighbours, see [`Candidates`].
+    pub(super) fn cube_of(&self, p: &Point3<f64>) -> [usize; 3] {
+        self.cell_of(p).map(|c| c / CUBE_CELLS)
+    }
+
+    /// Calls `visit` with the points in a cube of cells and in the cells around it, run by run, until it returns true.
+    pub(super) fn any_around_cube(
+        &self,
+        cube: [usize; 3],
+        mut visit: impl FnMut(&[Point3<f64>]) -> bool,
+    ) -> bool {
+        let cells = [0, 1, 2].map(|a| {
+            let first = CUBE_CELLS * cube[a];
+            (
+                first.saturating_sub(1),
+                (first + CUBE_CELLS).min(self.dims[a] - 1),
+            )
+        });
+        self.blocks.any_run(&cells, |run| visit(&self.points[run]))
+    }
+
     /// The nearest of the points in all cells that a sphere's box touches.
     fn nearest_in_box(&self, centre: &Point3<f64>, radius_m: f64) -> Option<(usize, f64)> {
         let (mut least, mut at) = (f64::INFINITY, u32::MAX);
@@ -190,10 +213,13 @@ impl GridIndex {
         }
     }
 
-    /// Where in the index' order of blocks a point would lie: searches for points in this order find their
-    /// cells in the processor's cache.
-    pub fn block_of(&self, p: &Point3<f64>) -> u32 {
-        self.blocks.place_of(&self.cell_of(p)) as u32
+    /// Where in the index' order of blocks a point would lie, and in which cube of the block: searches for points in this
+    /// order find their cells in the processor's cache.
+    pub fn place_of(&self, p: &Point3<f64>) -> (u32, u8) {
+        let bit = |c: usize| (c / CUBE_CELLS % CUBE_CELLS) as u8;
+        let cell = self.cell_of(p);
+        let [i, j, k] = cell.map(bit);
+        (self.blocks.place_of(&cell) as u32, 4 * k + 2 * j + i)
     }
 
     /// The cell that holds a point, or the nearest one outside the cloud's box.

@@ -1,12 +1,14 @@
 //! Point clouds and searching in them.
 
 mod blocks;
+mod candidates;
 mod cell_moments;
 mod cloud_type;
 mod cylinder;
 mod grid_index;
 mod tiles;
 
+pub(crate) use candidates::Candidates;
 pub use cell_moments::CellMoments;
 pub use cloud_type::Cloud;
 pub use cylinder::Cylinder;
