@@ -2,8 +2,13 @@
 
 use rayon::prelude::*;
 
-/// Most items that are prepared at a time, so that memory does not grow with the threads of large machines.
+/// Most items in memory at a time, however many threads the machine has.
 const AHEAD: usize = 8;
+
+/// Number of items worked on at a time: one per thread, at most eight.
+pub(crate) fn ahead() -> usize {
+    rayon::current_num_threads().min(AHEAD)
+}
 
 /// The work was stopped by the caller before it was done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -72,7 +77,7 @@ impl dyn Progress + '_ {
 
     /// Does a piece of work item by item, in two parts: `prepare` runs on as many items at a time as there are
     /// threads, eight at most, then `take` gets the results one by one, in order. Looks before each whether to
-    /// stop, and advances after it. Memory: one prepared item a thread.
+    /// stop, and advances after it. Memory: one prepared item per thread, at most eight.
     ///
     /// # Errors
     /// The work on an item failed (of several, the first in order), or the caller stopped it.
@@ -90,7 +95,7 @@ impl dyn Progress + '_ {
     {
         let items: Vec<I::Item> = items.into_iter().collect();
         self.begin(what, items.len() as u64);
-        for group in items.chunks(rayon::current_num_threads().min(AHEAD)) {
+        for group in items.chunks(ahead()) {
             self.check()?;
             let prepared: Vec<Result<T, E>> = group.par_iter().map(|item| prepare(*item)).collect();
             for (item, prepared) in group.iter().zip(prepared) {

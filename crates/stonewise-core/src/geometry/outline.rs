@@ -42,7 +42,7 @@ const SPECK: f64 = 0.05;
 /// The largest of the [`outlines`]. If it encloses fewer than nine tenths of the points, because a railing or
 /// a plant in front of the face divides it, wider gaps are closed until it does, up to eight times as wide;
 /// where that is not enough, it is the largest piece all the same. `None` under four points or where they
-/// cover no area. Cost: O(n log n + cells).
+/// cover no area. Cost: O(n log n + cells times the closing distance in cells).
 pub fn outline(points: &[Point2<f64>], params: &OutlineParams) -> Option<Vec<Point2<f64>>> {
     let mut largest = None;
     for doubling in 0..=DOUBLINGS {
@@ -71,7 +71,7 @@ pub fn outline(points: &[Point2<f64>], params: &OutlineParams) -> Option<Vec<Poi
 /// outside the outermost points (a closing on a distance raster), and its pieces are traced and simplified
 /// (Douglas & Peucker 1973). Holes, what lies in them, and pieces with less than a twentieth of the points are
 /// dropped. The point spacing is sqrt(area / n) of the convex hull. Empty under four points or where they
-/// cover no area. Cost: O(n log n + cells).
+/// cover no area. Cost: O(n log n + cells times the closing distance in cells).
 pub fn outlines(points: &[Point2<f64>], params: &OutlineParams) -> Vec<Vec<Point2<f64>>> {
     let mut pieces = pieces(points, params);
     for i in (1..pieces.len()).rev() {
@@ -112,11 +112,13 @@ fn pieces(points: &[Point2<f64>], params: &OutlineParams) -> Vec<Vec<Point2<f64>
         let at = (p - origin) / cell;
         seeds[at.y.round() as usize * width + at.x.round() as usize] = true;
     }
-    let to_points = contour::distance(&seeds, width, height);
+    // Only depths up to one cell above `level` shape the contour, and that is below this reach.
+    let reach = radius / cell + 2.0;
+    let to_points = contour::distance(&seeds, width, reach);
     let outside: Vec<bool> = to_points.iter().map(|d| d * cell > radius).collect();
     // Depth inside the union of discs; the border of the patch lies half a spacing outside its outermost
     // points.
-    let depth = contour::distance(&outside, width, height);
+    let depth = contour::distance(&outside, width, reach);
     let level = ((radius - 0.5 * spacing) / cell).max(0.5);
     let in_metres = |ring: Vec<Point2<f64>>| {
         let ring = ring.iter().map(|p| origin + p.coords * cell).collect();

@@ -49,6 +49,7 @@ impl Band {
         }
     }
 
+    #[inline(always)]
     fn range(&self, column: usize, first: usize, count: usize) -> Range<usize> {
         let start = column * self.stride + first - column;
         start..start + count
@@ -146,6 +147,7 @@ pub(crate) struct BandInverse(Band);
 
 impl BandInverse {
     /// Rows `first ..= first + count - 1` of column `column`, all in the band and not above the diagonal.
+    #[inline(always)]
     pub fn column_part(&self, column: usize, first: usize, count: usize) -> &[f64] {
         &self.0.columns[self.0.range(column, first, count)]
     }

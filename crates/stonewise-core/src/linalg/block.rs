@@ -8,7 +8,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 
 /// Which blocks of a symmetric matrix are present, analysed once. Blocks have `B` rows and columns.
 pub(crate) struct BlockPattern<const B: usize> {
@@ -143,20 +143,27 @@ impl<const B: usize> BlockFactor<'_, B> {
         2.0 * sum
     }
 
-    /// A^-1 times a vector of blocks.
-    pub fn solve(&self, rhs: &[SVector<f64, B>]) -> Vec<SVector<f64, B>> {
-        let mut flat: Vec<f64> = rhs.iter().flat_map(|b| b.iter().copied()).collect();
+    /// A^-1 times one or more vectors of blocks: the factor is read once for all of them.
+    pub fn solve<const K: usize>(&self, rhs: &[SMatrix<f64, B, K>]) -> Vec<SMatrix<f64, B, K>> {
+        let rows = rhs.len() * B;
+        let place = |block: usize, column: usize| column * rows + block * B;
+        let mut flat = vec![0.0; rows * K];
+        for (i, block) in rhs.iter().enumerate() {
+            for (k, column) in block.column_iter().enumerate() {
+                flat[place(i, k)..][..B].copy_from_slice(column.as_slice());
+            }
+        }
         let symbolic = &self.pattern.symbolic;
-        if let Ok(mut memory) = MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq)) {
-            let rows = flat.len();
+        if let Ok(mut memory) = MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(K, Par::Seq)) {
             LltRef::new(symbolic, &self.values).solve_in_place_with_conj(
                 Conj::No,
-                MatMut::from_column_major_slice_mut(&mut flat, rows, 1),
+                MatMut::from_column_major_slice_mut(&mut flat, rows, K),
                 Par::Seq,
                 MemStack::new(&mut memory),
             );
         }
-        flat.chunks_exact(B).map(SVector::from_column_slice).collect()
+        let block = |i: usize| SMatrix::from_fn(|r, k| flat[place(i, k) + r]);
+        (0..rhs.len()).map(block).collect()
     }
 
     pub(super) fn supernodes(&self) -> Option<SupernodalLltRef<'_, usize, f64>> {
@@ -170,7 +177,7 @@ impl<const B: usize> BlockFactor<'_, B> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::DMatrix;
+    use nalgebra::{DMatrix, SVector};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -218,6 +225,13 @@ mod tests {
         let want = expected.solve(&flat);
         let got = factor.solve(&rhs);
         assert!((0..nodes * B).all(|r| (got[r / B][r % B] - want[r]).abs() < 1e-12));
+        let twice: Vec<SMatrix<f64, B, 2>> = rhs
+            .iter()
+            .map(|b| SMatrix::from_columns(&[*b, -2.0 * b]))
+            .collect();
+        for (both, one) in factor.solve(&twice).iter().zip(&got) {
+            assert!((both.column(0) - one).norm() < 1e-12 && (both.column(1) + 2.0 * one).norm() < 1e-12);
+        }
         let inverse = expected.inverse();
         let selected = factor.selected_inverse().unwrap();
         for (i, d) in selected.diagonal.iter().enumerate() {

@@ -6,6 +6,7 @@ use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_uppe
 use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::{Accum, Mat, Par};
 use nalgebra::SMatrix;
+use rayon::prelude::*;
 
 /// Blocks of the inverse on the pattern of the matrix; an edge block has rows of the higher node and columns
 /// of the lower.
@@ -15,14 +16,17 @@ pub(crate) struct SelectedInverse<const B: usize> {
 }
 
 impl<const B: usize> BlockFactor<'_, B> {
-    /// Blocks of A^-1 on the pattern of A (Takahashi, Fagan & Chen 1973), supernode by supernode from the
-    /// last.
+    /// Blocks of A^-1 on the pattern of A (Takahashi, Fagan & Chen 1973), level by level from the roots of the elimination
+    /// tree; the supernodes of a level are computed in parallel.
     ///
     /// Cost: about twice that of the factor.
     pub fn selected_inverse(&self) -> Option<SelectedInverse<B>> {
         let mut known = Known::new(self.supernodes()?);
-        for s in (0..known.blocks.len()).rev() {
-            known.blocks[s] = known.block(s);
+        for level in known.levels() {
+            let blocks: Vec<Mat<f64>> = level.par_iter().map(|&s| known.block(s)).collect();
+            for (s, block) in level.into_iter().zip(blocks) {
+                known.blocks[s] = block;
+            }
         }
         let place = self.pattern.symbolic.perm()?.arrays().1;
         let block = |i: usize, j: usize| {
@@ -31,9 +35,12 @@ impl<const B: usize> BlockFactor<'_, B> {
                 known.entry(a.max(b), a.min(b))
             })
         };
-        let edges = self.pattern.edges.iter();
+        let edges = self.pattern.edges.par_iter();
         Some(SelectedInverse {
-            diagonal: (0..self.pattern.nodes).map(|i| block(i, i)).collect(),
+            diagonal: (0..self.pattern.nodes)
+                .into_par_iter()
+                .map(|i| block(i, i))
+                .collect(),
             edges: edges.map(|&(low, high)| block(high, low)).collect(),
         })
     }
@@ -63,7 +70,28 @@ impl<'a> Known<'a> {
         }
     }
 
-    /// The block of a supernode; those of all later ones are known.
+    /// Supernodes by their distance from the root of the elimination tree. The block of each depends on those of its
+    /// ancestors only.
+    fn levels(&self) -> Vec<Vec<usize>> {
+        let symbolic = self.factor.symbolic();
+        let mut depths = vec![0; self.blocks.len()];
+        let mut levels: Vec<Vec<usize>> = Vec::new();
+        for s in (0..depths.len()).rev() {
+            let parent = symbolic
+                .supernode(s)
+                .pattern()
+                .first()
+                .map(|row| self.owner[*row]);
+            depths[s] = parent.map_or(0, |parent| depths[parent] + 1);
+            if levels.len() == depths[s] {
+                levels.push(Vec::new());
+            }
+            levels[depths[s]].push(s);
+        }
+        levels
+    }
+
+    /// The block of a supernode; those of its ancestors are known.
     fn block(&self, s: usize) -> Mat<f64> {
         let node = self.factor.supernode(s);
         let (width, pattern) = (node.val().ncols(), node.pattern());

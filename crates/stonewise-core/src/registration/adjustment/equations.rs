@@ -6,6 +6,7 @@ use super::observation::surface::{Equations, Inflation, with_shift_error};
 use super::state::Adjustment;
 use crate::geometry::Bounds;
 use crate::statistics::upper_median;
+use rayon::prelude::*;
 
 /// A stone's normal equations about the common motion.
 pub(crate) struct StoneEquations {
@@ -24,12 +25,12 @@ impl Adjustment {
             on_own: self.on_own(i, error_m),
         };
         let with_field = self.equations_with_field(error_m);
-        with_field.into_iter().enumerate().map(of_stone).collect()
+        with_field.into_par_iter().enumerate().map(of_stone).collect()
     }
 
     /// Normal equations of all stones, moving with the field, for an error of their motions in the face.
     pub fn equations_with_field(&self, error_m: f64) -> Vec<NormalEquations> {
-        let stones = self.stones.iter().enumerate();
+        let stones = self.stones.par_iter().enumerate();
         stones
             .map(|(i, s)| self.observed(i, &s.with_field, Moving::WithField, error_m))
             .collect()

@@ -1,4 +1,4 @@
-//! Evaluation of the stones' own points, batch by batch.
+//! Evaluation of the stones' own points, some batches at a time.
 
 use super::candidate::CandidateMotion;
 use super::covered::covered;
@@ -10,7 +10,6 @@ use super::observation::surface::{
 use super::state::{Adjustment, StoneState};
 use super::stone_vector::StoneVector;
 use super::survey::Points;
-use crate::progress::Interrupted;
 use crate::registration::points::{PairPoints, PairSource};
 use rayon::prelude::*;
 
@@ -75,22 +74,22 @@ impl Adjustment {
 
     /// Normal equations of all stones that moved since they were last evaluated.
     pub fn evaluate<S: PairSource>(&mut self, points: &Points<S>) -> Result<(), AdjustError<S::Error>> {
-        for (batch, range) in points.batches.iter().enumerate() {
-            points.progress.check()?;
-            if self.stones[range.clone()].iter().any(|s| self.is_due(s)) {
-                let pairs = points.load(batch)?;
-                let new: Vec<Option<Evaluation>> = pairs
-                    .par_iter()
-                    .zip(range.clone())
-                    .map(|(pair, i)| self.evaluate_one(i, pair))
-                    .collect();
-                for (new, stone) in new.into_iter().zip(&mut self.stones[range.clone()]) {
-                    if let Some(new) = new {
-                        new.store(stone);
-                    }
-                }
+        let due: Vec<bool> = self.stones.iter().map(|stone| self.is_due(stone)).collect();
+        let settled = due.iter().filter(|due| !**due).count();
+        points.progress.advance(settled as u64);
+        for group in points.groups(|i| due[i]) {
+            let new = points.of_stones(
+                &group,
+                |i| due[i],
+                |i, pair| {
+                    let new = self.evaluate_one(i, pair);
+                    points.progress.advance(1);
+                    new
+                },
+            )?;
+            for (i, new) in new {
+                new.store(&mut self.stones[i]);
             }
-            points.progress.advance(range.len() as u64);
         }
         let covered = covered(self);
         let uncovered = self
@@ -115,12 +114,9 @@ impl Adjustment {
         self.surface.is_due(&candidate.surface, &candidate.motion)
     }
 
-    /// What changed at a stone; `None` if nothing did.
-    fn evaluate_one(&self, i: usize, pair: &PairPoints) -> Option<Evaluation> {
+    /// What the points of a stone say where it moved.
+    fn evaluate_one(&self, i: usize, pair: &PairPoints) -> Evaluation {
         let stone = &self.stones[i];
-        if !self.is_due(stone) {
-            return None;
-        }
         let mut local = self.local_pair(i, pair);
         if stone.is_roughness_due {
             local.noise.roughness = self.likely_roughness(stone, &local);
@@ -141,17 +137,20 @@ impl Adjustment {
                 noise: &self.surface.noise,
                 layout: &self.surface.layout,
             };
-            test.run(self.surface.inflation_of_all(stone.surface()))
+            // Where the equations are missing, the noise has changed.
+            let is_known = stone.with_field.surface.equations().is_some();
+            let known = stone.ratio.halves.as_ref().filter(|_| is_known);
+            test.run(self.surface.inflation_of_all(stone.surface()), known)
         };
 
         // The ratio is that of both present motions, so the equations must belong to them as well.
         let own = stone.on_own.as_ref();
-        Some(Evaluation {
+        Evaluation {
             with_field: anew(&stone.with_field),
             on_own: own.map(anew),
             ratio: own.map(compare),
             roughness,
-        })
+        }
     }
 
     /// Most likely roughness of a stone at its present motion, as a factor on the usual one.
@@ -167,21 +166,11 @@ impl Adjustment {
     ///
     /// Cost: eight evaluations of these stones.
     pub fn probe<S: PairSource>(&mut self, points: &Points<S>) -> Result<(), AdjustError<S::Error>> {
-        for (batch, range) in points.batches.iter().enumerate() {
-            if self.stones[range.clone()].iter().any(|s| self.is_open(s)) {
-                let pairs = points.load(batch)?;
-                let found: Vec<(usize, Option<StoneVector>)> = pairs
-                    .par_iter()
-                    .zip(range.clone())
-                    .filter(|(_, i)| self.is_open(&self.stones[*i]))
-                    .map(|(pair, i)| {
-                        points.progress.check()?;
-                        Ok((i, self.probe_one(i, pair)))
-                    })
-                    .collect::<Result<_, Interrupted>>()?;
-                for (i, place) in found {
-                    self.stones[i].on_own = place.map(CandidateMotion::new);
-                }
+        for group in points.groups(|i| self.is_open(&self.stones[i])) {
+            let is_open = |i: usize| self.is_open(&self.stones[i]);
+            let found = points.of_stones(&group, is_open, |i, pair| self.probe_one(i, pair))?;
+            for (i, place) in found {
+                self.stones[i].on_own = place.map(CandidateMotion::new);
             }
         }
         Ok(())

@@ -13,7 +13,6 @@ use super::stone_vector::{Matrix9, StoneVector};
 use super::survey::Points;
 use crate::cloud::GridIndex;
 use crate::geometry::Bounds;
-use crate::progress::Interrupted;
 use crate::registration::points::{PairPoints, PairSource};
 use crate::statistics::component_median;
 use nalgebra::{Point3, Vector3};
@@ -71,24 +70,11 @@ impl Adjustment {
             .enumerate()
             .map(|(i, places)| self.elsewhere(i, places))
             .collect();
-        for (batch, range) in points.batches.iter().enumerate() {
-            if elsewhere[range.clone()].iter().all(Vec::is_empty) {
-                continue;
-            }
-            let pairs = points.load(batch)?;
-            let found: Vec<(usize, Option<StoneVector>)> = pairs
-                .par_iter()
-                .zip(range.clone())
-                .filter(|(_, i)| !elsewhere[*i].is_empty())
-                .map(|(pair, i)| {
-                    points.progress.check()?;
-                    Ok((i, self.returned(i, pair, &elsewhere[i])))
-                })
-                .collect::<Result<_, Interrupted>>()?;
-            for (i, place) in found {
-                if let Some(place) = place {
-                    self.put(i, place);
-                }
+        for group in points.groups(|i| !elsewhere[i].is_empty()) {
+            let is_far = |i: usize| !elsewhere[i].is_empty();
+            let found = points.of_stones(&group, is_far, |i, pair| self.returned(i, pair, &elsewhere[i]))?;
+            for (i, place) in found.into_iter().filter_map(|(i, place)| Some((i, place?))) {
+                self.put(i, place);
             }
         }
         Ok(())

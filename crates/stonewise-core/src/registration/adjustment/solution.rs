@@ -11,6 +11,7 @@ use super::partial_view::estimated_rate;
 use super::state::{Adjustment, Evidence, StoneState};
 use crate::progress::{Interrupted, Progress};
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
 /// Rounds in which weights and field follow each other within an iteration; one for large walls, where each
 /// is expensive.
@@ -237,8 +238,12 @@ impl Adjustment {
             stone.p_with_field = p;
         }
         self.return_to_field(equations, field);
-        for (i, prediction) in field.from_others.iter().enumerate() {
-            self.stones[i].doubt = self.doubt(i, prediction);
+        let predictions = field.from_others.par_iter().enumerate();
+        let doubts: Vec<f64> = predictions
+            .map(|(i, prediction)| self.doubt(i, prediction))
+            .collect();
+        for (stone, doubt) in self.stones.iter_mut().zip(doubts) {
+            stone.doubt = doubt;
         }
         let decided = || self.stones.iter().filter(|s| s.evidence == Evidence::Decides);
         let wrong = |s: &StoneState| (s.info.hidden.powi(2), s.p_wrong());
@@ -261,21 +266,24 @@ impl Adjustment {
     /// show it.
     fn return_to_field(&mut self, equations: &[StoneEquations], field: &Field) {
         let own = self.prior.loose_variances();
-        for (i, (equations, prediction)) in equations.iter().zip(&field.from_others).enumerate() {
+        let evidence = |(i, (equations, prediction)): (usize, (&StoneEquations, &Prediction))| {
             let at_optimum = equations.on_own.as_ref().unwrap_or(&equations.with_field);
             let loose = posterior(at_optimum, prediction, &own);
             let covariance = loose.covariance.fixed_view::<3, 3>(0, 0).into_owned();
             let largest_m = covariance.symmetric_eigenvalues().max().sqrt();
-            let is_open = largest_m > UNCERTAIN_SHARE * self.prior.loose.move_m;
             let is_contradicted =
-                self.stones[i].ratio.is_contradicted && !self.photos_show_own_motion(i, prediction);
-            let stone = &mut self.stones[i];
-            stone.evidence = match () {
-                () if is_open => Evidence::TooWeak,
-                () if is_contradicted => Evidence::Contradictory,
+                || self.stones[i].ratio.is_contradicted && !self.photos_show_own_motion(i, prediction);
+            match () {
+                () if largest_m > UNCERTAIN_SHARE * self.prior.loose.move_m => Evidence::TooWeak,
+                () if is_contradicted() => Evidence::Contradictory,
                 () => Evidence::Decides,
-            };
-            if stone.evidence != Evidence::Decides {
+            }
+        };
+        let stones = equations.par_iter().zip(&field.from_others).enumerate();
+        let found: Vec<Evidence> = stones.map(evidence).collect();
+        for (stone, evidence) in self.stones.iter_mut().zip(found) {
+            stone.evidence = evidence;
+            if evidence != Evidence::Decides {
                 stone.p_with_field = 1.0;
             }
         }

@@ -6,6 +6,7 @@ use super::field::{Field, Posterior, posterior};
 use super::solution::Solution;
 use super::state::Adjustment;
 use super::stone_vector::StoneVector;
+use rayon::prelude::*;
 
 /// One stone in this many may still swing between two optima of its own when the adjustment has settled.
 const RESTLESS: usize = 50;
@@ -30,14 +31,17 @@ impl Adjustment {
         // stone shows itself.
         let followed = self.equations_with_field(0.0);
         let own = self.prior.components.with_error(self.prior.own_variances());
+        let stones = followed.par_iter().zip(&solution.field.from_others);
+        let tied: Vec<Posterior> = stones
+            .map(|(equations, prediction)| posterior(equations, prediction, &own))
+            .collect();
         let mut restless = 0;
-        for (i, equations) in followed.iter().enumerate() {
-            let tied = posterior(equations, &solution.field.from_others[i], &own);
+        for (i, tied) in tied.iter().enumerate() {
             let p = self.stones[i].p_with_field;
             self.stones[i].effective_freedom = tied.effective_freedom;
             let origin = self.prior.common_in(i);
             let limits = StepLimits::of(self);
-            let with_field = limits.follow(&mut self.stones[i].with_field, &tied, &origin, p);
+            let with_field = limits.follow(&mut self.stones[i].with_field, tied, &origin, p);
             let on_own = self.step_on_own(i, &solution.equations[i], &solution.field);
             restless += usize::from(with_field.counts) + usize::from(on_own.counts);
             self.stones[i].swings = with_field.swings || on_own.swings;

@@ -8,6 +8,13 @@ pub(crate) type Vector9 = SVector<f64, 9>;
 /// A matrix over nine unknowns.
 pub(crate) type Matrix9 = SMatrix<f64, 9, 9>;
 
+/// Distance of a stone's rim from its centroid, metres, at which rotation and bending are compared with translation: that
+/// of a block of 40 cm.
+const RIM_M: f64 = 0.2;
+/// Motions nearer to each other than this, metres, are alike: what a stone's points say at one of them, such as which
+/// points are outliers, also holds at the other.
+const ALIKE_M: f64 = 1e-3;
+
 /// Motion of a stone in its frame, whose axes are (along, up, out) of the wall around it.
 ///
 /// The order of the unknowns: translation of the centroid (m), rotation vector (rad), bending (1/m: second
@@ -53,6 +60,17 @@ impl StoneVector {
     /// All nine unknowns in order.
     pub fn unknowns(&self) -> &Vector9 {
         &self.0
+    }
+
+    /// Distance from another motion, metres: of the centroid, plus that of the rim by rotation and bending.
+    pub fn distance_m(&self, other: &Self) -> f64 {
+        let d = *self - *other;
+        d.translation().norm() + RIM_M * d.rotation().norm() + RIM_M * RIM_M * d.bending().norm()
+    }
+
+    /// Whether points say much the same at both motions.
+    pub fn is_alike(&self, other: &Self) -> bool {
+        self.distance_m(other) <= ALIKE_M
     }
 
     /// All nine unknowns times `factor`.

@@ -5,7 +5,7 @@ use super::field::{Graph, Place};
 use super::params::AdjustmentParams;
 use super::partial_view::{hidden, missing};
 use crate::id::StoneId;
-use crate::progress::Progress;
+use crate::progress::{Interrupted, Progress, ahead};
 use crate::registration::points::{NOISES_ALIKE, PairPoints, PairSource, Window, face_spacing};
 use crate::statistics::{component_median, upper_median};
 use nalgebra::Vector3;
@@ -50,9 +50,37 @@ pub(crate) struct Points<'a, S> {
 }
 
 impl<S: PairSource> Points<'_, S> {
-    /// The pairs of a batch.
-    pub fn load(&self, batch: usize) -> Result<Vec<PairPoints>, AdjustError<S::Error>> {
-        self.source.load(batch).map_err(AdjustError::Source)
+    /// The batches that hold a stone for which `is_due`, in groups that are worked on together.
+    pub fn groups(&self, is_due: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
+        let batches = 0..self.batches.len();
+        let due: Vec<usize> = batches
+            .filter(|&batch| self.batches[batch].clone().any(&is_due))
+            .collect();
+        due.chunks(ahead()).map(<[usize]>::to_vec).collect()
+    }
+
+    /// Runs `work` on the stones of these batches for which `is_due`; returns the results in order. The batches are read
+    /// and processed in parallel; if several fail, the error of the first is returned.
+    pub fn of_stones<T: Send>(
+        &self,
+        group: &[usize],
+        is_due: impl Fn(usize) -> bool + Sync,
+        work: impl Fn(usize, &PairPoints) -> T + Sync,
+    ) -> Result<Vec<(usize, T)>, AdjustError<S::Error>> {
+        let of_stone = |(pair, i): (&PairPoints, usize)| {
+            self.progress.check()?;
+            Ok((i, work(i, pair)))
+        };
+        let of_batch = |batch: &usize| -> Result<Vec<(usize, T)>, AdjustError<S::Error>> {
+            self.progress.check()?;
+            let pairs = self.source.load(*batch).map_err(AdjustError::Source)?;
+            let stones = pairs.par_iter().zip(self.batches[*batch].clone());
+            let due = stones.filter(|(_, i)| is_due(*i)).map(of_stone);
+            Ok(due.collect::<Result<Vec<_>, Interrupted>>()?)
+        };
+        let found: Vec<Result<_, _>> = group.par_iter().map(of_batch).collect();
+        let found = found.into_iter().collect::<Result<Vec<_>, _>>()?;
+        Ok(found.into_iter().flatten().collect())
     }
 }
 
@@ -80,26 +108,35 @@ pub(crate) fn survey<'a, S: PairSource>(
     let mut sample: Vec<(usize, PairPoints)> = Vec::new();
     let mut stride = 1;
 
-    for batch in 0..source.batch_count() {
-        progress.check()?;
+    let load = |batch: usize| {
         let pairs = source.load(batch).map_err(AdjustError::Source)?;
-        batches.push(stones.len()..stones.len() + pairs.len());
-        spacings.extend(pairs.par_iter().filter_map(spacing).collect::<Vec<f64>>());
-        for pair in pairs {
-            let index = stones.len();
-            let info = StoneInfo::new(&pair, params);
-            let window = pair.window.clone();
-            if info.usable && index % stride == 0 {
-                sample.push((index, pair));
+        let spacings: Vec<f64> = pairs.par_iter().filter_map(spacing).collect();
+        Ok::<_, AdjustError<S::Error>>((pairs, spacings))
+    };
+    progress.each_prepared(
+        "read stones",
+        0..source.batch_count(),
+        load,
+        |_, (pairs, found)| {
+            batches.push(stones.len()..stones.len() + pairs.len());
+            spacings.extend(found);
+            for pair in pairs {
+                let index = stones.len();
+                let info = StoneInfo::new(&pair, params);
+                let window = pair.window.clone();
+                if info.usable && index % stride == 0 {
+                    sample.push((index, pair));
+                }
+                windows.push(window);
+                stones.push(info);
+                if sample.len() > 2 * SAMPLE {
+                    stride *= 2;
+                    sample.retain(|(i, _)| i % stride == 0);
+                }
             }
-            windows.push(window);
-            stones.push(info);
-            if sample.len() > 2 * SAMPLE {
-                stride *= 2;
-                sample.retain(|(i, _)| i % stride == 0);
-            }
-        }
-    }
+            Ok(())
+        },
+    )?;
 
     set_noise_factors(&mut stones, &windows);
     let shared: Vec<f64> = windows
@@ -275,6 +312,60 @@ mod tests {
         let kept: Vec<usize> = found.points.sample.iter().map(|s| s.0).collect();
         assert!((SAMPLE / 2..=SAMPLE).contains(&kept.len()), "{}", kept.len());
         assert!(kept.windows(2).all(|k| k[1] - k[0] == kept[1] - kept[0]) && kept[kept.len() - 1] > 380);
+    }
+
+    /// Pairs some batches of which cannot be read.
+    struct Unreadable(MemoryPairs, &'static [usize]);
+
+    #[derive(Debug, PartialEq, thiserror::Error)]
+    #[error("batch {0}")]
+    struct Batch(usize);
+
+    impl PairSource for Unreadable {
+        type Error = Batch;
+
+        fn batch_count(&self) -> usize {
+            self.0.batch_count()
+        }
+
+        fn load(&self, batch: usize) -> Result<Vec<PairPoints>, Batch> {
+            match self.1.contains(&batch) {
+                true => Err(Batch(batch)),
+                false => self.0.load(batch).map_err(|_| Batch(batch)),
+            }
+        }
+    }
+
+    #[test]
+    fn stones_of_a_group_are_worked_on_in_order_and_the_first_error_counts() {
+        let source = |unreadable| {
+            let pairs = (0..300).map(|k| pair(k, 0.05, Vector3::zeros()));
+            Unreadable(MemoryPairs::new(pairs.collect()), unreadable)
+        };
+        let every_third = |i: usize| i.is_multiple_of(3) && i < 190;
+        let worked = |source: &Unreadable| {
+            let points = Points {
+                source,
+                batches: (0..5).map(|b| 64 * b..(64 * (b + 1)).min(300)).collect(),
+                sample: Vec::new(),
+                progress: &Silent,
+            };
+            let groups = points.groups(every_third);
+            // Batches of 64 stones: no stone of the fourth and fifth is due.
+            assert_eq!(groups.concat(), [0, 1, 2]);
+            let of_group = |group: &Vec<usize>| points.of_stones(group, every_third, |_, pair| pair.first);
+            groups.iter().map(of_group).collect::<Result<Vec<_>, _>>()
+        };
+        for threads in [1, 3] {
+            stonewise_testing::on_threads(threads, || {
+                let all = worked(&source(&[])).unwrap().concat();
+                let expected: Vec<(usize, StoneId)> =
+                    (0..190).step_by(3).map(|i| (i, StoneId(i as u32 + 1))).collect();
+                assert_eq!(all, expected);
+                let error = worked(&source(&[1, 2])).unwrap_err();
+                assert!(matches!(error, AdjustError::Source(Batch(1))), "{error:?}");
+            });
+        }
     }
 
     #[test]

@@ -11,9 +11,8 @@ use super::solution::Solution;
 use super::state::{Adjustment, StoneState};
 use super::stone_vector::{Matrix9, StoneVector};
 use super::survey::Points;
-use crate::progress::Interrupted;
 use crate::registration::photos::{FaceMotion, PhotoSource, PhotoStatus, Track, Tracker};
-use crate::registration::points::PairSource;
+use crate::registration::points::{PairPoints, PairSource};
 use crate::stone::PairResult;
 use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
@@ -113,34 +112,30 @@ impl Adjustment {
         let progress = points.progress;
         progress.begin("track stones in photos", self.stones.len() as u64);
 
+        // One batch at a time: its stones' parts of photos need more memory than its points.
         for (batch, range) in points.batches.iter().enumerate() {
-            let pairs = points.load(batch)?;
             let chips = photos.load(batch).map_err(AdjustError::Source)?;
-            let found = pairs
-                .par_iter()
-                .zip(&chips)
-                .zip(range.clone())
-                .map(|((pair, chips), i)| {
-                    progress.check()?;
-                    let search_m = self.search_m(i, photos);
-                    let from = |start: FaceMotion| {
-                        let tracker = Tracker {
-                            pair,
-                            face_from_world: &self.prior.graph.nodes[i].face_from_world,
-                            start,
-                            search_m,
-                            photos: photos.photos(),
-                            chips,
-                            params: photos.params(),
-                            picture_px: photos.picture_px(),
-                        };
-                        tracker.track()
+            debug_assert_eq!(chips.len(), range.len());
+            let track = |i: usize, pair: &PairPoints| {
+                let search_m = self.search_m(i, photos);
+                let from = |start: FaceMotion| {
+                    let tracker = Tracker {
+                        pair,
+                        face_from_world: &self.prior.graph.nodes[i].face_from_world,
+                        start,
+                        search_m,
+                        photos: photos.photos(),
+                        chips: &chips[i - range.start],
+                        params: photos.params(),
+                        picture_px: photos.picture_px(),
                     };
-                    let starts = self.starts(i, surroundings[i], search_m);
-                    Ok(Track::best_of(starts.into_iter().map(from).collect()))
-                })
-                .collect::<Result<Vec<Option<Track>>, Interrupted>>()?;
-            tracks.extend(found.into_iter().flatten());
+                    tracker.track()
+                };
+                let starts = self.starts(i, surroundings[i], search_m);
+                Track::best_of(starts.into_iter().map(from).collect())
+            };
+            let found = points.of_stones(&[batch], |_| true, track)?;
+            tracks.extend(found.into_iter().filter_map(|(_, track)| track));
             progress.advance(range.len() as u64);
         }
 
@@ -217,7 +212,7 @@ impl Adjustment {
 
     /// What the stones' own points say, moving with the field.
     pub fn cloud_equations(&self, error_m: f64) -> Vec<NormalEquations> {
-        let stones = self.stones.iter().enumerate();
+        let stones = self.stones.par_iter().enumerate();
         stones
             .map(|(i, s)| self.observed_by_clouds(i, &s.with_field, error_m))
             .collect()

@@ -9,7 +9,7 @@ use crate::registration::adjustment::JointMotions;
 use crate::registration::adjustment::joint_motions::JointStone;
 use crate::registration::observers::JointErrors;
 use crate::registration::octave_patches::octave_patches;
-use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, Point3, SMatrix, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -230,22 +230,18 @@ impl Covariance<'_> {
     /// The covariance times these columns.
     pub fn times(&self, columns: &[Matrix3x6]) -> Vec<Matrix3x6> {
         let (body, nodes) = (self.body, self.body.motions.stones.len());
-        let solve = |c: usize| {
-            let mut rhs = vec![SVector::<f64, 9>::zeros(); nodes];
-            for (stone, x) in body.stones.iter().zip(columns) {
-                rhs[stone.node] = stone.joint.by_field.transpose() * x.column(c);
-            }
-            self.factor.solve(&rhs)
-        };
-        let solved: Vec<Vec<SVector<f64, 9>>> = (0..6).into_par_iter().map(solve).collect();
+        let mut rhs = vec![SMatrix::<f64, 9, 6>::zeros(); nodes];
+        for (stone, x) in body.stones.iter().zip(columns) {
+            rhs[stone.node] = stone.joint.by_field.transpose() * x;
+        }
+        let solved = self.factor.solve(&rhs);
         let mut of_unknowns = body.shared.zeros::<6>();
         for (i, x) in columns.iter().enumerate() {
             body.shared.add_transposed(i, x, &mut of_unknowns);
         }
         let spread = body.shared.spread(&of_unknowns);
         let of_stone = |(i, (stone, x)): (usize, (&BodyStone, &Matrix3x6))| {
-            let field = SMatrix::<f64, 9, 6>::from_fn(|r, c| solved[c][stone.node][r]);
-            stone.joint.by_field * field + stone.own * x + body.shared.at(i, &spread)
+            stone.joint.by_field * solved[stone.node] + stone.own * x + body.shared.at(i, &spread)
         };
         body.stones
             .iter()

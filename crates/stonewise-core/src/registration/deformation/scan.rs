@@ -125,6 +125,8 @@ struct Model<'a> {
     inverse: Matrix6<f64>,
     /// Unknowns of shared errors times what the rigid motion takes up of them.
     of_shared: OMatrix<f64, Dyn, Const<6>>,
+    /// Variance that shared errors give to what the rigid motion takes up.
+    shared_of_rigid: Matrix6<f64>,
     /// Inverse covariance of what the observations of each stone give.
     weights: Vec<Matrix3<f64>>,
 }
@@ -143,6 +145,7 @@ impl<'a> Model<'a> {
             body,
             firm,
             inverse: information.try_inverse()?,
+            shared_of_rigid: of_shared.transpose() * body.shared.spread(&of_shared),
             of_shared,
             weights: (0..body.stones.len()).map(|i| weight(body, i)).collect(),
         })
@@ -194,8 +197,12 @@ impl<'a> Model<'a> {
         }
         let explained = self.inverse * with_rigid;
         let information = plain - with_rigid.transpose() * explained;
-        of_shared -= &self.of_shared * explained;
-        let shared = of_shared.transpose() * self.body.shared.spread(&of_shared);
+        // The covariance of the unknowns' part less what the rigid motion takes up, term by term: few unknowns act on the
+        // stones of a small bulge, all on the rigid motion.
+        let spread = self.body.shared.spread(&of_shared);
+        let both = spread.transpose() * &self.of_shared * explained;
+        let shared = of_shared.transpose() * spread - both - both.transpose()
+            + explained.transpose() * self.shared_of_rigid * explained;
         std::array::from_fn(|k| {
             let left = information[(k, k)];
             let variance = left + shared[(k, k)];

@@ -90,7 +90,7 @@ impl SharedErrors {
         OMatrix::<f64, Dyn, nalgebra::Const<C>>::zeros(self.unknowns)
     }
 
-    /// The covariance of the unknowns times these columns.
+    /// The covariance of the unknowns times these columns; rows of zeros cost nothing.
     pub fn spread<const C: usize>(
         &self,
         x: &OMatrix<f64, Dyn, nalgebra::Const<C>>,
@@ -98,8 +98,14 @@ impl SharedErrors {
         let mut out = x.clone();
         for (first, spread) in &self.groups {
             if let Spread::Joint(covariance, _) = spread {
-                let part = covariance * x.rows(*first, covariance.nrows());
-                out.rows_mut(*first, covariance.nrows()).copy_from(&part);
+                let mut part = out.rows_mut(*first, covariance.nrows());
+                part.fill(0.0);
+                for (k, column) in covariance.column_iter().enumerate() {
+                    let row = x.row(first + k);
+                    if row.iter().any(|value| *value != 0.0) {
+                        part.ger(1.0, &column, &row.transpose(), 1.0);
+                    }
+                }
             }
         }
         out

@@ -3,6 +3,7 @@
 use super::problem::{FieldProblem, FieldStone};
 use crate::registration::adjustment::observation::NormalEquations;
 use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
+use rayon::prelude::*;
 
 /// Normal equations of the field's motion at a stone, in its frame, the stone's own motion integrated out.
 pub(crate) struct Eliminated {
@@ -39,7 +40,7 @@ pub(crate) fn eliminate_own_motions(
         }
         sum
     };
-    problem.stones.iter().map(of_stone).collect()
+    problem.stones.par_iter().map(of_stone).collect()
 }
 
 /// With D the standard deviations of the own motion: H - H D (I + D H D)^-1 D H, and so for the vector.

@@ -4,7 +4,7 @@ use super::field_vector::stone_from_field;
 use super::problem::FieldProblem;
 use super::solve::{Normal, normal_equations};
 use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 use rayon::prelude::*;
 
 /// A jump of the motion between two sides of the wall, beyond what the ties between them allow.
@@ -19,7 +19,7 @@ pub(crate) struct Jump {
 /// Estimates, for each way to part the stones into two sides, the common jump of the stones marked `true`.
 ///
 /// The jump is three more unknowns of the adjustment: with P the matrix of the field and Q the jump's
-/// columns, its information is R - Q' P^-1 Q, and P need not be factored again. Cost: three solves a way.
+/// columns, its information is R - Q' P^-1 Q, and P need not be factored again. Cost: one solve with three right-hand sides a way.
 /// `None` where the equations cannot be factored.
 pub(crate) fn test_jumps(problem: &FieldProblem, sides: &[Vec<bool>]) -> Option<Vec<Jump>> {
     let normal = normal_equations(problem)?;
@@ -42,12 +42,11 @@ pub(crate) fn test_jumps(problem: &FieldProblem, sides: &[Vec<bool>]) -> Option<
 
 /// `of_stone`: each stone's equations of the field unknowns.
 fn test_jump(normal: &Normal, of_stone: &[(Matrix9, Vector9)], side: &[bool]) -> Jump {
-    let solved = [0, 1, 2].map(|c| {
-        let column = |i: usize| of_stone[i].0.column(c) * f64::from(u8::from(side[i]));
-        normal
-            .factor
-            .solve(&(0..side.len()).map(column).collect::<Vec<_>>())
+    let columns = of_stone.iter().zip(side).map(|((m, _), moved)| match moved {
+        true => m.fixed_columns::<3>(0).into_owned(),
+        false => SMatrix::<f64, 9, 3>::zeros(),
     });
+    let solved = normal.factor.solve(&columns.collect::<Vec<_>>());
     let mut information = Matrix3::zeros();
     let mut vector = Vector3::zeros();
 
@@ -55,11 +54,7 @@ fn test_jump(normal: &Normal, of_stone: &[(Matrix9, Vector9)], side: &[bool]) ->
         let (m, v) = &of_stone[i];
         information += m.fixed_view::<3, 3>(0, 0);
         vector += (v - m * normal.state[i]).fixed_rows::<3>(0);
-        for (c, column) in solved.iter().enumerate() {
-            let known = m.fixed_rows::<3>(0) * column[i];
-            let mut target = information.column_mut(c);
-            target -= known;
-        }
+        information -= m.fixed_rows::<3>(0) * solved[i];
     }
 
     let information = 0.5 * (information + information.transpose());

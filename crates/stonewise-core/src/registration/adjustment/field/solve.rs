@@ -10,7 +10,7 @@ use super::prior::prior;
 use super::problem::FieldProblem;
 use crate::linalg::{BlockFactor, BlockMatrix, SelectedInverse};
 use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
-use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, SMatrix, Vector6};
 use rayon::prelude::*;
 
 /// The adjusted field.
@@ -56,7 +56,7 @@ fn of_stones(problem: &FieldProblem, eliminated: &[Eliminated]) -> Vec<Matrix9> 
         let a = stone_from_field(&problem.graph.nodes[i].face_from_world);
         a.transpose() * stone.information * a
     };
-    eliminated.iter().enumerate().map(of_stone).collect()
+    eliminated.par_iter().enumerate().map(of_stone).collect()
 }
 
 fn add_stones(matrix: &mut BlockMatrix<9>, of_stones: &[Matrix9]) {
@@ -107,16 +107,9 @@ pub(crate) fn solve(problem: &FieldProblem) -> Option<Field> {
 /// Covariance of the mean displacement over all stones: w' A^-1 w with w = 1/n at every stone's displacement.
 fn mean_covariance(factor: &BlockFactor<9>, stones: usize) -> Matrix3<f64> {
     let share = 1.0 / stones.max(1) as f64;
-    let columns = [0, 1, 2].map(|c| {
-        let mut weight = Vector9::zeros();
-        weight[c] = share;
-        let solved = factor.solve(&vec![weight; stones]);
-        solved
-            .iter()
-            .map(|x| x.fixed_rows::<3>(0) * share)
-            .sum::<Vector3<f64>>()
-    });
-    let covariance = Matrix3::from_columns(&columns);
+    let weight = SMatrix::<f64, 9, 3>::identity() * share;
+    let solved = factor.solve(&vec![weight; stones]);
+    let covariance: Matrix3<f64> = solved.iter().map(|x| x.fixed_rows::<3>(0) * share).sum();
     0.5 * (covariance + covariance.transpose())
 }
 

@@ -39,17 +39,37 @@ pub(crate) struct LikelihoodRatio {
     pub log_ratio: f64,
     /// Whether the stone's own motion is more likely, and one of its halves contradicts it.
     pub is_contradicted: bool,
+    /// What its halves say; `None` where the whole stone does not favour its own motion.
+    pub halves: Option<Halves>,
+}
+
+/// What the halves of a stone say between the two motions.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Halves {
+    /// Log likelihood ratio of the half that favours the stone's own motion least.
+    least: f64,
+    /// The motions that were compared: with the field, on its own.
+    at: [StoneVector; 2],
 }
 
 impl LikelihoodRatioTest<'_> {
-    /// `inflation`: factor on the points' variances, by which a log likelihood means less. Cost: four fits of
-    /// the surface; where the points favour the stone's own motion, sixteen of halves.
-    pub fn run(&self, inflation: f64) -> LikelihoodRatio {
+    /// `inflation`: factor on the points' variances, by which a log likelihood means less. `known`: what the halves said
+    /// before; they are not tested again while both motions stay alike. Cost: four fits of the surface, and sixteen more
+    /// for the halves.
+    pub fn run(&self, inflation: f64, known: Option<&Halves>) -> LikelihoodRatio {
         let log_ratio = self.log_ratio();
         let limit = CONTRADICTION * inflation;
+        let at = [self.with_field.motion, self.on_own.motion];
+        let known = known.filter(|halves| halves.at.iter().zip(&at).all(|(a, b)| a.is_alike(b)));
+        let test = || Halves {
+            least: self.least_half(),
+            at,
+        };
+        let halves = (log_ratio > limit).then(|| known.copied().unwrap_or_else(test));
         LikelihoodRatio {
             log_ratio,
-            is_contradicted: log_ratio > limit && self.least_half() < -limit,
+            is_contradicted: halves.is_some_and(|halves| halves.least < -limit),
+            halves,
         }
     }
 
@@ -169,6 +189,10 @@ mod tests {
     }
 
     fn compare(second: &[NearPoint], own: &Vector3<f64>) -> LikelihoodRatio {
+        compare_knowing(second, own, None)
+    }
+
+    fn compare_knowing(second: &[NearPoint], own: &Vector3<f64>, known: Option<&Halves>) -> LikelihoodRatio {
         let test = LikelihoodRatioTest {
             pair: &local_pair(second),
             with_field: placed(&Vector3::zeros()),
@@ -176,7 +200,7 @@ mod tests {
             noise: &NOISE,
             layout: &LAYOUT,
         };
-        test.run(1.0)
+        test.run(1.0, known)
     }
 
     #[test]
@@ -202,11 +226,19 @@ mod tests {
         let own = Vector3::new(0.0, 0.012, 0.0);
         let whole = compare(&scan(2, |_| own), &own);
         assert!(whole.log_ratio > 20.0 && !whole.is_contradicted, "{whole:?}");
-        let torn = compare(
-            &scan(2, |p| if p.y > -0.035 { own } else { Vector3::zeros() }),
-            &own,
-        );
+        let second = scan(2, |p| if p.y > -0.035 { own } else { Vector3::zeros() });
+        let torn = compare(&second, &own);
         assert!(torn.log_ratio > 20.0 && torn.is_contradicted, "{torn:?}");
+        // What halves said counts as long as both motions are alike.
+        let agreeing = |own: &Vector3<f64>| Halves {
+            least: 0.0,
+            at: [Vector3::zeros(), *own].map(|d| placed(&d).motion),
+        };
+        for (apart_m, is_known) in [(0.9e-3, true), (1.1e-3, false)] {
+            let known = agreeing(&(own + Vector3::new(0.0, apart_m, 0.0)));
+            let torn = compare_knowing(&second, &own, Some(&known));
+            assert_eq!(torn.is_contradicted, !is_known, "{apart_m}");
+        }
         let none = compare(&scan(2, |_| Vector3::zeros()), &own);
         assert!(none.log_ratio < -20.0 && !none.is_contradicted, "{none:?}");
     }

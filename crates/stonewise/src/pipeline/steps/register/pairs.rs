@@ -7,9 +7,9 @@ use crate::storage::step::StepDir;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::{fs, io};
 use stonewise_core::cloud::TileSource;
 use stonewise_core::epoch::Pair;
 use stonewise_core::id::StoneId;
@@ -17,10 +17,11 @@ use stonewise_core::progress::Progress;
 use stonewise_core::registration::{
     MatchedPair, NearPoint, PairPlaces, PairPoints, PairSource, StoneExtents, Window, stone_points,
 };
-use stonewise_io::table::{Table, read_columns, write_parquet};
 
-/// Stones in a batch: at 20,000 points an epoch, 30 MB.
+/// Stones in a batch: at 20,000 points an epoch, 30 MB, and twice as much while it is read. Up to eight are in memory at a
+/// time.
 const BATCH: usize = 64;
+
 /// Matched pairs whose points lie in one file a batch.
 pub struct DiskPairs {
     dir: PathBuf,
@@ -78,8 +79,10 @@ impl DiskPairs {
         })
     }
 
-    /// Writes the points of a batch: slot, part ([`FIRST`], [`SECOND`], [`NEARBY`]), x, y, z; the windows in
-    /// which they count.
+    /// Writes the file of a batch, which every iteration reads again: for each pair the points of the first epoch, of the
+    /// second, and of those near the stone in the second without its label. Each list is its number of points, then their
+    /// offsets from the stone's centroid in the first epoch, metres; little-endian, 32 bits each. Returns the windows in
+    /// which the points count.
     fn write_batch(
         &self,
         bins: &SpillBins<u32>,
@@ -99,48 +102,24 @@ impl DiskPairs {
             near[slot][epoch].push(point);
         }
 
-        let (mut slots, mut parts, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
+        let mut bytes = Vec::new();
         let mut windows = Vec::new();
-        for (slot, ([one, two], pair)) in near.iter().zip(&self.batches[batch]).enumerate() {
+        for ([one, two], pair) in near.iter().zip(&self.batches[batch]) {
             let chosen = stone_points([one, two], &pair.first.normal, &pair.shift, border_noises);
             windows.push(chosen.window.map(Arc::new));
-            let lists = [
-                (FIRST, chosen.first),
-                (SECOND, chosen.second),
-                (NEARBY, chosen.nearby_second),
-            ];
-            for (part, points) in lists {
-                slots.extend(std::iter::repeat_n(slot as u32, points.len()));
-                parts.extend(std::iter::repeat_n(part, points.len()));
-                offsets.extend(points);
+            for part in [chosen.first, chosen.second, chosen.nearby_second] {
+                bytes.extend((part.len() as u32).to_le_bytes());
+                bytes.extend(part.iter().flatten().flat_map(|x| x.to_le_bytes()));
             }
         }
 
-        let mut table = Table::new();
-        table.push("slot", "", "index of the pair of stones in its batch", slots)?;
-        table.push(
-            "part",
-            "",
-            "0: first epoch, 1: second epoch, 2: second epoch, near the stone",
-            parts,
-        )?;
-
-        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-            let values: Vec<f32> = offsets.iter().map(|o: &[f32; 3]| o[axis]).collect();
-            table.push(
-                name,
-                "m",
-                "offset of the point from the centroid of its stone in the first epoch",
-                values,
-            )?;
-        }
-
-        write_parquet(&self.file(batch), &table)?;
+        let path = self.file(batch);
+        fs::write(&path, &bytes).map_err(Error::io("writing", &path))?;
         Ok(windows)
     }
 
     fn file(&self, batch: usize) -> PathBuf {
-        self.dir.join(format!("pairs-{batch:05}.parquet"))
+        self.dir.join(format!("pairs-{batch:05}.bin"))
     }
 
     /// Sends every point of a matched stone, and every other point in its box, to its batch, relative to the
@@ -191,28 +170,35 @@ impl PairSource for DiskPairs {
 
     fn load(&self, batch: usize) -> Result<Vec<PairPoints>> {
         let pairs = &self.batches[batch];
-        let table = read_columns(&self.file(batch), &["slot", "part", "x", "y", "z"])?;
-        let (slot, part) = (table.required::<u32>("slot")?, table.required::<u32>("part")?);
-        let (x, y, z) = (
-            table.required::<f32>("x")?,
-            table.required::<f32>("y")?,
-            table.required::<f32>("z")?,
-        );
-        let mut offsets = vec![[const { Vec::new() }; 3]; pairs.len()];
-        for i in 0..slot.len() {
-            offsets[slot[i] as usize][part[i] as usize].push([x[i], y[i], z[i]]);
-        }
+        let path = self.file(batch);
+        let bytes = fs::read(&path).map_err(Error::io("reading", &path))?;
+        let mut rest = bytes.as_slice();
+        let mut part = || {
+            let (count, after) = rest.split_first_chunk()?;
+            let (points, after) = after.split_at_checked(POINT * u32::from_le_bytes(*count) as usize)?;
+            rest = after;
+            Some(points.as_chunks().0.iter().map(offset).collect())
+        };
+        let offsets: Option<Vec<[Vec<[f32; 3]>; 3]>> =
+            pairs.iter().map(|_| Some([part()?, part()?, part()?])).collect();
+        let offsets = offsets.filter(|_| rest.is_empty()).ok_or_else(|| {
+            let damaged = io::Error::from(io::ErrorKind::InvalidData);
+            Error::io("reading", &path)(damaged)
+        })?;
         let loaded = pairs.iter().zip(offsets).zip(&self.windows[batch]);
         let loaded = loaded.map(|((pair, offsets), window)| pair.with_points(offsets, window.clone()));
         Ok(loaded.collect())
     }
 }
 
-/// Parts of a stone's points in a batch's file: the first epoch's, the second's, and those near it in the
-/// second without its label.
-const FIRST: u32 = 0;
-const SECOND: u32 = 1;
-const NEARBY: u32 = 2;
+/// Bytes of a point in a batch's file.
+const POINT: usize = 12;
+
+/// The offset of a point in a batch's file.
+fn offset(bytes: &[u8; POINT]) -> [f32; 3] {
+    let axes = bytes.as_chunks().0;
+    [0, 1, 2].map(|k| f32::from_le_bytes(axes[k]))
+}
 
 const RECORD: usize = 16;
 
@@ -245,4 +231,90 @@ fn decode(record: &[u8]) -> (usize, usize, NearPoint) {
         source: u32::from(flags >> SOURCE_SHIFT),
     };
     (usize::from(short(0)), usize::from(flags & 1), point)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point3;
+    use stonewise_core::stone::Stone;
+
+    fn stone(id: u32) -> Stone {
+        Stone {
+            id: StoneId(id),
+            centroid: Point3::new(f64::from(id), 0.0, 0.0),
+            normal: Vector3::y(),
+            area_m2: 0.1,
+            points: 100,
+            photos: 1,
+            confidence: 1.0,
+        }
+    }
+
+    /// Points of a stone of 10 x 10 cm in an epoch, `count` of them.
+    fn points(epoch: u16, count: u16) -> Vec<NearPoint> {
+        let place = |k: u16| f32::from(k % 10) * 0.01 + f32::from(epoch) * 1e-4;
+        (0..count)
+            .map(|k| NearPoint {
+                offset: [place(k), 0.0, f32::from(k / 10) * 0.01],
+                labelled: true,
+                source: 3,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn points_that_were_written_are_read_again_and_a_cut_off_file_is_an_error() {
+        let dir = tempfile::tempdir().unwrap();
+        let pair = |id| MatchedPair {
+            first: stone(id),
+            second: stone(id),
+            shift: Vector3::zeros(),
+        };
+        // The second pair has no point in the second epoch.
+        let near = [[points(0, 60), points(1, 90)], [points(0, 20), Vec::new()]];
+        let mut spill = Spill::new(&dir.path().join("spill"), |k: &u32| format!("b{k}")).unwrap();
+        for (slot, epochs) in (0..).zip(&near) {
+            for (epoch, points) in (0..).zip(epochs) {
+                for point in points {
+                    spill.push(0, &encode(slot, epoch, *point)).unwrap();
+                }
+            }
+        }
+        let mut pairs = DiskPairs {
+            dir: dir.path().to_path_buf(),
+            batches: vec![vec![pair(1), pair(2)]],
+            windows: Vec::new(),
+        };
+        let windows = pairs.write_batch(&spill.finish().unwrap(), 0, 0.0).unwrap();
+        pairs.windows.push(windows);
+
+        let found = pairs.load(0).unwrap();
+        assert_eq!(found.len(), 2);
+        for (found, [one, two]) in found.iter().zip(&near) {
+            let chosen = stone_points([one, two], &Vector3::y(), &Vector3::zeros(), 0.0);
+            for (cloud, expected) in [
+                (&found.points_first, &chosen.first),
+                (&found.points_second, &chosen.second),
+                (&found.nearby_second, &chosen.nearby_second),
+            ] {
+                assert_eq!(cloud.len(), expected.len());
+                for (i, point) in expected.iter().enumerate() {
+                    assert_eq!(cloud.local(i).coords.cast::<f32>(), Vector3::from(*point));
+                }
+            }
+        }
+        assert!(found[0].points_second.len() == 90 && found[1].points_second.is_empty());
+
+        let bytes = fs::read(pairs.file(0)).unwrap();
+        for damaged in [
+            &bytes[..bytes.len() - 1],
+            &bytes[..2],
+            &[bytes.as_slice(), &[0]].concat(),
+        ] {
+            fs::write(pairs.file(0), damaged).unwrap();
+            let message = pairs.load(0).unwrap_err().to_string();
+            assert!(message.contains("pairs-00000.bin"), "{message}");
+        }
+    }
 }

@@ -10,6 +10,7 @@ use crate::registration::octave_patches::octave_patches;
 use crate::registration::photos::{Photo, PhotoParams, PhotoStatus, Track};
 use crate::statistics::upper_median;
 use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::array::from_fn;
 
@@ -209,13 +210,13 @@ impl PhotoModel {
 
     /// Gives each stone that photos show the weights of its bias, from the expected square of the bias over
     /// its variance.
-    pub fn weigh(&mut self, square: impl Fn(usize, &StonePhotos, Moving) -> f64) {
-        for (i, stone) in self.stones.iter_mut().enumerate() {
+    pub fn weigh(&mut self, square: impl Fn(usize, &StonePhotos, Moving) -> f64 + Sync) {
+        self.stones.par_iter_mut().enumerate().for_each(|(i, stone)| {
             if let Some(stone) = stone {
                 stone.weights =
                     BiasWeights::from_squares(stone.bias_components(), |moving| square(i, stone, moving));
             }
-        }
+        });
     }
 
     /// Covariance of the errors of all poses. The poses are adjusted to the clouds and follow the errors of their

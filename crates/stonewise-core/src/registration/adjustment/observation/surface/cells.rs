@@ -23,17 +23,26 @@ impl CellSums {
         }
     }
 
-    pub fn add(&mut self, epoch: usize, p: &[f64; 3], product: f64, weight: f64) {
-        let at = [0, 1].map(|a| ((p[a] - self.low[a]) / self.cell_m).floor());
-        if (0..2).all(|a| at[a] >= 0.0 && at[a] < self.counts[a] as f64) {
-            let cell = &mut self.sums[at[1] as usize * self.counts[0] + at[0] as usize][epoch];
-            cell.0 += product;
-            cell.1 += weight;
-        }
+    /// Number of the cell that holds a point.
+    #[inline(always)]
+    pub fn cell(&self, p: &[f64; 3]) -> Option<usize> {
+        let at = [0, 1].map(|a| (p[a] - self.low[a]) / self.cell_m);
+        let is_inside = (0..2).all(|a| at[a] >= 0.0 && at[a] < self.counts[a] as f64);
+        is_inside.then(|| at[1] as usize * self.counts[0] + at[0] as usize)
+    }
+
+    /// Adds to the sums of an epoch in a cell.
+    #[inline(always)]
+    pub fn add(&mut self, cell: usize, epoch: usize, product: f64, weight: f64) {
+        let sums = &mut self.sums[cell][epoch];
+        sums.0 += product;
+        sums.1 += weight;
     }
 
     pub fn count(&mut self, epoch: usize, p: &[f64; 3]) {
-        self.add(epoch, p, 0.0, 1.0);
+        if let Some(cell) = self.cell(p) {
+            self.add(cell, epoch, 0.0, 1.0);
+        }
     }
 
     /// Share of the cells of the larger face that hold points of both epochs.

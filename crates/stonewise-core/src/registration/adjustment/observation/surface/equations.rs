@@ -8,12 +8,15 @@ use super::local_motion::{LocalMotion, Still};
 use super::local_pair::LocalPair;
 use super::patch_fit::PatchFit;
 use super::patch_grid::{Basis, PatchGrid, WeightedPoint};
-use super::patches::{PatchPoints, pool_into_patches};
+use super::patches::{PatchChoice, PatchPoints, pool_into_patches};
 use super::point_weights::PointWeights;
 use super::robust::{robust_fit, steepness};
 use super::slope_scatter::SlopeScatter;
 use super::surface_noise::SurfaceNoise;
+use crate::linalg::BandInverse;
 use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
+use pulp::{Arch, Simd, WithSimd};
+use std::array::from_fn;
 
 /// The normal equations of a stone's points at one of its motions, and figures of how well both epochs agree
 /// there.
@@ -101,7 +104,11 @@ pub(crate) fn equations(
 ) -> Equations {
     let noise = &noise.of_stone(&pair.noise);
     let motion = LocalMotion::new(motion);
-    let patches = pool_into_patches(pair, &motion, &LocalMotion::new(window), noise, layout);
+    let choice = match options.is_rough {
+        true => PatchChoice::EverySecond,
+        false => PatchChoice::All,
+    };
+    let patches = pool_into_patches(pair, &motion, &LocalMotion::new(window), noise, layout, choice);
     let mut sum = Equations::zeros(patches.overlap);
     let mut squares = 0.0;
     if !options.is_rough {
@@ -114,11 +121,7 @@ pub(crate) fn equations(
         layout,
         is_rough: options.is_rough,
     };
-    let used = match options.is_rough {
-        true => every_second(patches.list),
-        false => patches.list,
-    };
-    for mut patch in used {
+    for mut patch in patches.list {
         options.weights.apply(&mut patch.epochs);
         squares += setting.add_patch(patch, &mut sum);
     }
@@ -140,21 +143,11 @@ pub(crate) fn deviance(pair: &LocalPair, motion: &StoneVector, noise: &SurfaceNo
             fit.surface_deviance(noise) + epochs.iter().zip(noise.sigma_m).map(of_points).sum::<f64>()
         })
     };
-    pool_into_patches(pair, &motion, &motion, noise, layout)
+    pool_into_patches(pair, &motion, &motion, noise, layout, PatchChoice::All)
         .list
         .into_iter()
         .map(of_patch)
         .sum()
-}
-
-/// Of more than two patches those of one colour of a chessboard, the colour that has more of them.
-fn every_second(mut patches: Vec<PatchPoints>) -> Vec<PatchPoints> {
-    let count = patches.len();
-    if count > 2 {
-        let is_dark = 2 * patches.iter().filter(|patch| patch.is_dark).count() > count;
-        patches.retain(|patch| patch.is_dark == is_dark);
-    }
-    patches
 }
 
 /// At which motion and with which noise the patches of a stone are evaluated.
@@ -175,49 +168,100 @@ impl Setting<'_> {
             return 0.0;
         };
         sum.weights.store(&epochs);
-        let mut squares = [0.0; 2];
         let shares = Shares::new(&grid, &epochs, noise);
         let mut coupling = vec![[0.0; 9]; grid.coefficient_count()];
         let mut cells = PatchCells::new(&grid, self.layout.cell_m);
         let inverse = (!self.is_rough).then(|| fit.factor.inverse());
-
-        for (epoch, points) in epochs.iter().enumerate() {
-            let sigma = noise.sigma_m[epoch];
-            for o in points {
-                let [h, hu, hv] = fit.surface(&o.basis);
-                let r = o.position[2] - h;
-                cells.add(epoch, o, r, [hu, hv]);
-                sum.points[epoch] += 1;
-                sum.distances[epoch] += r.abs() * steepness([hu, hv]).sqrt() / sigma;
-                squares[epoch] += o.weight * r * r / (sigma * sigma);
-                sum.deviance += o.weight * r * r / (sigma * sigma);
-                let w = o.weight / (sigma * sigma);
-                let share = shares.of(epoch, &o.basis);
-                let row = self.jacobian(o, [hu, hv]).map(|j| share * j);
-                let j = Vector9::from(row);
-                sum.gradient += j * (r * w);
-                if let Some(inverse) = &inverse {
-                    // The surface follows each point a little, most at the edge of the points, and takes the slope
-                    // with it: residuals and slopes are correlated by minus this covariance, which the gradient of
-                    // the determinant makes good.
-                    let bias = self.jacobian(o, fit.slope_covariance(&o.basis, inverse));
-                    let level = self.jacobian(o, [0.0; 2]);
-                    sum.gradient -= (Vector9::from(bias) - Vector9::from(level)) * (share * w);
-                }
-                scatter(&o.basis, w, &row, &mut coupling);
-                sum.information.syger(w, &j, &j, 1.0);
-            }
-        }
-
+        let squares = [0, 1].map(|epoch| {
+            Arch::new().dispatch(EpochPoints {
+                setting: self,
+                epoch,
+                points: &epochs[epoch],
+                fit: &fit,
+                inverse: inverse.as_ref(),
+                shares: &shares,
+                coupling: &mut coupling,
+                cells: &mut cells,
+                sum,
+            })
+        });
         sum.deviance += fit.surface_deviance(noise) - epochs.iter().map(Vec::len).sum::<usize>() as f64;
         take_off_surface(&fit, coupling, &mut sum.information);
         cells.finish(noise, sum);
         squares[1]
     }
 
+    #[inline(always)]
     fn jacobian(&self, point: &WeightedPoint, slopes: [f64; 2]) -> [f64; 9] {
         self.motion.jacobian(self.still, &point.position, slopes)
     }
+}
+
+/// The points of an epoch on a patch, and the sums to which they are added. The loop is compiled for the widest vectors of
+/// the processor.
+struct EpochPoints<'a> {
+    setting: &'a Setting<'a>,
+    epoch: usize,
+    points: &'a [WeightedPoint],
+    fit: &'a PatchFit,
+    /// Inverse of the fit's factor; `None` in a rough evaluation.
+    inverse: Option<&'a BandInverse>,
+    shares: &'a Shares,
+    coupling: &'a mut [[f64; 9]],
+    cells: &'a mut PatchCells,
+    sum: &'a mut Equations,
+}
+
+impl WithSimd for EpochPoints<'_> {
+    /// Sum of the weighted squared residuals, in units of sigma.
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        let Self {
+            setting,
+            epoch,
+            fit,
+            sum,
+            ..
+        } = self;
+        let sigma = setting.noise.sigma_m[epoch];
+        let mut squares = 0.0;
+        for o in self.points {
+            let [h, hu, hv] = fit.surface(&o.basis);
+            let r = o.position[2] - h;
+            self.cells.add(epoch, o, r, [hu, hv]);
+            sum.points[epoch] += 1;
+            sum.distances[epoch] += r.abs() * steepness([hu, hv]).sqrt() / sigma;
+            let square = o.weight * r * r / (sigma * sigma);
+            squares += square;
+            sum.deviance += square;
+            let w = o.weight / (sigma * sigma);
+            let share = self.shares.of(epoch, &o.basis);
+            let row = setting.jacobian(o, [hu, hv]).map(|j| share * j);
+            add_scaled(&mut sum.gradient.data.0[0], r * w, &row);
+            if let Some(inverse) = self.inverse {
+                // The surface follows each point a little, most at the edge of the points, and takes the slope
+                // with it: residuals and slopes are correlated by minus this covariance, which the gradient of
+                // the determinant makes good.
+                let bias = setting.jacobian(o, fit.slope_covariance(&o.basis, inverse));
+                let level = setting.jacobian(o, [0.0; 2]);
+                let by: [f64; 9] = from_fn(|k| bias[k] - level[k]);
+                add_scaled(&mut sum.gradient.data.0[0], -(share * w), &by);
+            }
+            scatter(&o.basis, w, &row, self.coupling);
+            for (c, j) in row.iter().enumerate() {
+                add_scaled(&mut sum.information.data.0[c], w * j, &row);
+            }
+        }
+        squares
+    }
+}
+
+/// Adds `factor * values` to a column.
+#[inline(always)]
+fn add_scaled(column: &mut [f64; 9], factor: f64, values: &[f64; 9]) {
+    *column = from_fn(|k| column[k] + factor * values[k]);
 }
 
 /// How the epochs share the stone's motion at each place of a patch: each takes the more of it, the less its
@@ -246,6 +290,7 @@ impl Shares {
     }
 
     /// By how much of the motion a point of an epoch moves: the later one with it, the first one against it.
+    #[inline(always)]
     fn of(&self, epoch: usize, basis: &Basis) -> f64 {
         let [first, second] = [0, 1].map(|e| gather(basis, &self.weights[e]));
         match epoch {
@@ -256,6 +301,7 @@ impl Shares {
 }
 
 /// The sum of the coefficients times the basis.
+#[inline(always)]
 fn gather(basis: &Basis, coefficients: &[[f64; 1]]) -> f64 {
     let [short, long] = basis.value;
     let along = |(a, l): (usize, f64)| {
@@ -268,6 +314,7 @@ fn gather(basis: &Basis, coefficients: &[[f64; 1]]) -> f64 {
 
 /// Adds `weight * basis * row` to the right-hand sides of the coefficients, one column for each of the motion's
 /// unknowns.
+#[inline(always)]
 fn scatter<const N: usize>(basis: &Basis, weight: f64, row: &[f64; N], into: &mut [[f64; N]]) {
     let [short, long] = basis.value;
     for (a, l) in long.into_iter().enumerate() {
@@ -294,6 +341,7 @@ fn take_off_surface(fit: &PatchFit, mut coupling: Vec<[f64; 9]>, information: &m
 /// The cells of a patch in which the epochs are compared.
 struct PatchCells {
     small: CellSums,
+    /// Sums for the slopes along u and v, in the cells of `small`.
     slopes: [CellSums; 2],
     /// Quarters of the patch.
     coarse: CellSums,
@@ -311,13 +359,18 @@ impl PatchCells {
         }
     }
 
+    #[inline(always)]
     fn add(&mut self, epoch: usize, point: &WeightedPoint, residual: f64, slopes: [f64; 2]) {
         let (at, weight) = (&point.position, steepness(slopes));
-        self.small.add(epoch, at, weight * residual, weight);
-        self.coarse.add(epoch, at, weight * residual, weight);
-        for (cells, slope) in self.slopes.iter_mut().zip(slopes) {
-            let w = point.weight * slope;
-            cells.add(epoch, at, w * residual, w * slope);
+        if let Some(cell) = self.coarse.cell(at) {
+            self.coarse.add(cell, epoch, weight * residual, weight);
+        }
+        if let Some(cell) = self.small.cell(at) {
+            self.small.add(cell, epoch, weight * residual, weight);
+            for (cells, slope) in self.slopes.iter_mut().zip(slopes) {
+                let w = point.weight * slope;
+                cells.add(cell, epoch, w * residual, w * slope);
+            }
         }
     }
 
@@ -494,7 +547,7 @@ mod tests {
         let x = StoneVector::zeros();
         let stored = equations(&pair, &x, &x, &NOISE, &WITH_OUTLIERS, &FitOptions::EXACT).weights;
         let motion = LocalMotion::new(&x);
-        let mut patch = pool_into_patches(&pair, &motion, &motion, &NOISE, &WITH_OUTLIERS)
+        let mut patch = pool_into_patches(&pair, &motion, &motion, &NOISE, &WITH_OUTLIERS, PatchChoice::All)
             .list
             .remove(0);
         stored.apply(&mut patch.epochs);

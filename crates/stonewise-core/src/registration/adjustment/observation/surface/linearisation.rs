@@ -9,13 +9,6 @@ use crate::registration::adjustment::stone_vector::StoneVector;
 /// first eight iterations; from then on motions change by less than a window's border, and points that come
 /// and go would keep the iteration from settling.
 const CHOICES: usize = 11;
-/// Weights of points at one motion are a good start at another that is nearer than this, metres. Where it is farther
-/// away, points of one epoch may have counted as outliers of the other.
-const ALIKE_M: f64 = 1e-3;
-/// Distance of a stone's rim from its centroid, metres, at which rotation and bending are compared with
-/// translation: that of a block of 40 cm.
-const RIM_M: f64 = 0.2;
-
 /// The equations of a stone's surface at one of its motions, and the window in which its points count.
 #[derive(Clone, Debug)]
 pub(crate) struct Linearisation {
@@ -47,20 +40,17 @@ impl Linearisation {
     /// Weights with which the points start at the next evaluation, for the stone at `motion`.
     pub fn weights(&self, motion: &StoneVector) -> &PointWeights {
         static NONE: PointWeights = PointWeights::NONE;
-        match self.is_due(motion, ALIKE_M) {
-            true => &NONE,
-            false => &self.weights,
+        match &self.evaluated {
+            Some((at, _)) if at.is_alike(motion) => &self.weights,
+            _ => &NONE,
         }
     }
 
-    /// Whether the equations are missing or belong to a motion farther away than this, metres (of the
-    /// centroid or the rim).
+    /// Whether the equations are missing or belong to a motion farther away than this, metres.
     pub fn is_due(&self, motion: &StoneVector, reach_m: f64) -> bool {
-        self.evaluated.as_ref().is_none_or(|(at, _)| {
-            let d = *at - *motion;
-            let turn = RIM_M * d.rotation().norm() + RIM_M * RIM_M * d.bending().norm();
-            d.translation().norm() + turn > reach_m
-        })
+        self.evaluated
+            .as_ref()
+            .is_none_or(|(at, _)| at.distance_m(motion) > reach_m)
     }
 
     /// The motion with which the window moves at the next evaluation, for the stone at `motion`: the stone's,

@@ -49,6 +49,7 @@ impl LocalMotion {
     /// Derivative, with respect to the motion, of the residual of a point of the second epoch moved back, or of the
     /// negative residual of one of the first epoch moved onto the second. The point is now at `p`, where the surface
     /// has these slopes.
+    #[inline(always)]
     pub fn jacobian(&self, still: Still, p: &[f64; 3], slopes: [f64; 2]) -> [f64; 9] {
         let upright = Vector3::new(-slopes[0], -slopes[1], 1.0);
         let [uu, uv, vv] = self.bending;

@@ -21,8 +21,7 @@ pub(crate) enum Effort {
     Aligning,
     /// Exactly, again once the equations may be wrong by a micrometre, less than any standard deviation.
     Weighing,
-    /// Exactly, again once the equations may be wrong by a hundredth of the tolerance at which the adjustment has
-    /// settled.
+    /// Exactly, again once the equations may be wrong by a tenth of the tolerance at which the adjustment has settled.
     Settling,
 }
 
@@ -31,7 +30,7 @@ impl Effort {
     fn linear_m(self) -> f64 {
         match self {
             Self::Aligning | Self::Weighing => 1e-6,
-            Self::Settling => 1e-8,
+            Self::Settling => 1e-7,
         }
     }
 }

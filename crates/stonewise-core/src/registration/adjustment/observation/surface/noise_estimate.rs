@@ -5,7 +5,7 @@ use super::local_motion::LocalMotion;
 use super::local_pair::LocalPair;
 use super::patch_fit::PatchFit;
 use super::patch_grid::WeightedPoint;
-use super::patches::{PatchPoints, pool_into_patches};
+use super::patches::{PatchChoice, PatchPoints, pool_into_patches};
 use super::robust::robust_fit;
 use super::surface_noise::SurfaceNoise;
 use crate::registration::adjustment::stone_vector::StoneVector;
@@ -112,7 +112,7 @@ fn sampled(sample: &[(&LocalPair, StoneVector)], noise: &SurfaceNoise, layout: &
         .par_iter()
         .map(|(pair, x)| {
             let motion = LocalMotion::new(x);
-            pool_into_patches(pair, &motion, &motion, noise, layout).list
+            pool_into_patches(pair, &motion, &motion, noise, layout, PatchChoice::All).list
         })
         .collect::<Vec<_>>()
         .into_iter()

@@ -40,6 +40,7 @@ impl PatchFit {
     }
 
     /// Height and its slopes along u and v.
+    #[inline(always)]
     pub fn surface(&self, basis: &Basis) -> [f64; 3] {
         let (s, l) = (self.grid.short, 1 - self.grid.short);
         let mut out = [0.0; 3];
@@ -57,6 +58,7 @@ impl PatchFit {
 
     /// Covariance of the height with its slopes along u and v, given the points: `inverse` is that of
     /// [`Self::factor`].
+    #[inline(always)]
     pub fn slope_covariance(&self, basis: &Basis, inverse: &BandInverse) -> [f64; 2] {
         let [short, long] = basis.value;
         // Covariance of each coefficient with the height.

@@ -85,6 +85,7 @@ impl PatchGrid {
     }
 
     /// A point with full weight.
+    #[inline]
     pub fn point(&self, index: u32, position: [f64; 3]) -> WeightedPoint {
         WeightedPoint {
             position,
@@ -94,6 +95,7 @@ impl PatchGrid {
         }
     }
 
+    #[inline]
     pub fn basis(&self, u: f64, v: f64) -> Basis {
         let place = [u, v];
         let mut at = [0; 2];

@@ -6,6 +6,7 @@ use super::local_motion::{LocalMotion, Still};
 use super::local_pair::LocalPair;
 use super::patch_grid::{PatchGrid, WeightedPoint};
 use super::surface_noise::SurfaceNoise;
+use std::collections::BTreeSet;
 
 /// Points in each epoch that a patch needs: twice the unknowns of a plane, for a fit whose outliers can be detected.
 const PATCH_POINTS: usize = 12;
@@ -16,6 +17,9 @@ const MARGIN_CELLS: f64 = 2.0;
 /// epoch. The fit depends on where points lie between the cells, most for sharp points: if these moved over the cells,
 /// some motions would seem likelier by that alone.
 const HEAVIER: f64 = 2.0;
+/// Fraction of the patches from one that is used to the next, modulo one: the golden ratio, so that they lie neither in
+/// one row nor in one column.
+const NEXT_PATCH: f64 = 0.618_033_988_75;
 /// Shortest side of a patch, in cells: a cubic spline's four coefficients.
 const LEAST_CELLS: usize = 4;
 
@@ -25,8 +29,16 @@ pub(crate) struct PatchPoints {
     pub epochs: [Vec<WeightedPoint>; 2],
     /// Roughness of the stone over that of most.
     pub roughness: f64,
-    /// Whether its column and row add to an odd number, as those of the dark squares of a chessboard.
-    pub is_dark: bool,
+}
+
+/// Which patches of a face are used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PatchChoice {
+    All,
+    /// Of more than two patches those of one colour of a chessboard, the colour that has more of them.
+    EverySecond,
+    /// At most this many, spread over the face.
+    AtMost(usize),
 }
 
 pub(crate) struct Patches {
@@ -43,6 +55,7 @@ pub(crate) fn pool_into_patches(
     window: &LocalMotion,
     noise: &SurfaceNoise,
     layout: &Layout,
+    choice: PatchChoice,
 ) -> Patches {
     let mut second = pair.second_in(window);
     let weight = |count: usize, epoch: usize| count as f64 / noise.sigma_m[epoch].powi(2);
@@ -68,31 +81,34 @@ pub(crate) fn pool_into_patches(
         };
     };
     let cuts = Cuts::new(face, layout);
-    let count = cuts.count[0] * cuts.count[1];
-    let mut list: Vec<PatchPoints> = (0..count)
-        .map(|patch| PatchPoints {
-            grid: cuts.grid(patch, layout.cell_m),
-            // Patches in the middle of a face have more points than those at its rim.
-            epochs: [&first, &second].map(|points| Vec::with_capacity(3 * points.len() / (2 * count))),
-            roughness: pair.noise.roughness,
-            is_dark: cuts.place(patch).iter().sum::<usize>() % 2 == 1,
-        })
-        .collect();
-
     let mut compare = CellSums::new(low, high, COMPARE_CELLS * layout.cell_m);
+    // Per patch the points of each epoch, by their places in its list.
+    let mut places = vec![[Vec::new(), Vec::new()]; cuts.count[0] * cuts.count[1]];
     for (epoch, points) in [&first, &second].into_iter().enumerate() {
-        for (i, p) in points {
+        for (place, (_, p)) in points.iter().enumerate() {
             compare.count(epoch, p);
             if let Some(patch) = cuts.patch_at(p) {
-                let PatchPoints { grid, epochs, .. } = &mut list[patch];
-                epochs[epoch].push(grid.point(*i, *p));
+                places[patch][epoch].push(place);
             }
         }
     }
 
-    list.retain(|patch| patch.epochs.iter().all(|o| o.len() >= PATCH_POINTS));
+    let is_seen = |patch: &usize| places[*patch].iter().all(|p| p.len() >= PATCH_POINTS);
+    let chosen = cuts.chosen((0..places.len()).filter(is_seen).collect(), choice);
+    let of_patch = |patch: usize| {
+        let grid = cuts.grid(patch, layout.cell_m);
+        let epochs = [(&first, 0), (&second, 1)].map(|(points, epoch)| {
+            let of_place = |place: &usize| grid.point(points[*place].0, points[*place].1);
+            places[patch][epoch].iter().map(of_place).collect()
+        });
+        PatchPoints {
+            grid,
+            epochs,
+            roughness: pair.noise.roughness,
+        }
+    };
     Patches {
-        list,
+        list: chosen.into_iter().map(of_patch).collect(),
         overlap: compare.overlap(),
         still,
     }
@@ -136,8 +152,27 @@ impl Cuts {
         [patch % self.count[0], patch / self.count[0]]
     }
 
+    /// The patches that are used, of these.
+    fn chosen(&self, mut patches: Vec<usize>, choice: PatchChoice) -> Vec<usize> {
+        let count = patches.len();
+        match choice {
+            PatchChoice::EverySecond if count > 2 => {
+                let is_dark = |patch: &usize| self.place(*patch).iter().sum::<usize>() % 2 == 1;
+                let are_dark = 2 * patches.iter().filter(|patch| is_dark(patch)).count() > count;
+                patches.retain(|patch| is_dark(patch) == are_dark);
+                patches
+            }
+            PatchChoice::AtMost(most) if count > most => {
+                let place = |k: usize| (((k as f64 + 0.5) * NEXT_PATCH).fract() * count as f64) as usize;
+                let places: BTreeSet<usize> = (0..most).map(place).collect();
+                places.into_iter().map(|place| patches[place]).collect()
+            }
+            _ => patches,
+        }
+    }
+
     fn patch_at(&self, p: &[f64; 3]) -> Option<usize> {
-        let at = [0, 1].map(|a| ((p[a] - self.low[a]) / self.step[a]).floor());
+        let at = [0, 1].map(|a| (p[a] - self.low[a]) / self.step[a]);
         let is_inside = (0..2).all(|a| at[a] >= 0.0 && at[a] < self.count[a] as f64);
         is_inside.then(|| at[1] as usize * self.count[0] + at[0] as usize)
     }
@@ -150,5 +185,69 @@ impl Cuts {
             [corner[0] + self.step[0], corner[1] + self.step[1]],
             cell_m,
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registration::adjustment::stone_vector::StoneVector;
+
+    /// A flat face of 1 x 0.8 m, points every centimetre in both epochs: six by five patches of 18 cells of a centimetre.
+    fn chosen(choice: PatchChoice) -> Vec<PatchPoints> {
+        let points: Vec<[f64; 3]> = (0..8000)
+            .map(|k| [0.01 * f64::from(k % 100), 0.01 * f64::from(k / 100), 0.0])
+            .collect();
+        let noise = SurfaceNoise {
+            sigma_m: [0.001; 2],
+            tau_m: 0.001,
+        };
+        let layout = Layout {
+            cell_m: 0.01,
+            patch_cells: 18,
+            outlier_sigmas: 3.5,
+        };
+        let still = LocalMotion::new(&StoneVector::zeros());
+        let pair = LocalPair::of_points(points.clone(), points);
+        pool_into_patches(&pair, &still, &still, &noise, &layout, choice).list
+    }
+
+    fn corner(patch: &PatchPoints) -> [i64; 2] {
+        patch.grid.low().map(|x| (x * 1e6).round() as i64)
+    }
+
+    fn indices(patch: &PatchPoints, epoch: usize) -> Vec<u32> {
+        patch.epochs[epoch].iter().map(|p| p.index).collect()
+    }
+
+    #[test]
+    fn each_point_lies_in_one_patch_and_choices_leave_patches_as_they_are() {
+        let all = chosen(PatchChoice::All);
+        assert_eq!(all.len(), 30);
+        for epoch in 0..2 {
+            let mut found: Vec<u32> = all.iter().flat_map(|patch| indices(patch, epoch)).collect();
+            found.sort_unstable();
+            assert_eq!(found, (0..8000).collect::<Vec<u32>>());
+        }
+        let half = chosen(PatchChoice::EverySecond);
+        let four = chosen(PatchChoice::AtMost(4));
+        assert_eq!(
+            (half.len(), four.len(), chosen(PatchChoice::AtMost(99)).len()),
+            (15, 4, 30)
+        );
+        for patch in half.iter().chain(&four) {
+            let same = all.iter().find(|other| corner(other) == corner(patch)).unwrap();
+            assert_eq!(indices(same, 1), indices(patch, 1));
+        }
+        // No two of every second patch share a side: corners of neighbours differ along both axes.
+        for (k, a) in half.iter().enumerate() {
+            for b in &half[k + 1..] {
+                let apart = [0, 1].map(|axis| (corner(a)[axis] - corner(b)[axis]).abs());
+                assert!(
+                    apart[0].min(apart[1]) > 0 || apart[0].max(apart[1]) > 250_000,
+                    "{apart:?}"
+                );
+            }
+        }
     }
 }

@@ -4,6 +4,7 @@ use super::layout::Layout;
 use super::patch_fit::PatchFit;
 use super::patch_grid::{PatchGrid, WeightedPoint};
 use super::surface_noise::SurfaceNoise;
+use pulp::{Arch, Simd, WithSimd};
 
 /// Most rounds of reweighting. A second round moves weights by some percent, a third by none; each costs a
 /// factorisation.
@@ -15,6 +16,7 @@ const CHANGED: f64 = 0.05;
 /// counts is the distance from the surface and not that along the height (orthogonal distance regression,
 /// Boggs, Byrd & Schnabel 1987). At the steep rims of stones, where a surface of cells also fits worst,
 /// points say little.
+#[inline(always)]
 pub(crate) fn steepness([u, v]: [f64; 2]) -> f64 {
     1.0 / (1.0 + u * u + v * v)
 }
@@ -33,9 +35,11 @@ pub(crate) fn robust_fit(
     let mut fit = PatchFit::new(grid, [&epochs[0], &epochs[1]], noise)?;
     for _ in 0..REWEIGHTINGS {
         let weights = [0, 1].map(|epoch| {
-            let limit = layout.outlier_sigmas * noise.sigma_m[epoch];
-            let points = epochs[epoch].iter();
-            points.map(|o| weight(&fit, o, limit)).collect::<Vec<f64>>()
+            Arch::new().dispatch(Weights {
+                fit: &fit,
+                points: &epochs[epoch],
+                limit_m: layout.outlier_sigmas * noise.sigma_m[epoch],
+            })
         });
         let points = || epochs.iter().flatten().zip(weights.iter().flatten());
         if points().all(|(o, weight)| (weight - o.weight).abs() <= CHANGED) {
@@ -49,8 +53,30 @@ pub(crate) fn robust_fit(
     Some(fit)
 }
 
+/// The weights of an epoch's points; those farther off the surface than a limit lose weight. The loop is compiled for
+/// the widest vectors of the processor.
+struct Weights<'a> {
+    fit: &'a PatchFit,
+    points: &'a [WeightedPoint],
+    limit_m: f64,
+}
+
+impl WithSimd for Weights<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<f64> {
+        let mut weights = vec![0.0; self.points.len()];
+        for (weight, point) in weights.iter_mut().zip(self.points) {
+            *weight = weight_of(self.fit, point, self.limit_m);
+        }
+        weights
+    }
+}
+
 /// Weight of a point by the slopes of the surface there and its distance from it.
-fn weight(fit: &PatchFit, point: &WeightedPoint, limit_m: f64) -> f64 {
+#[inline(always)]
+fn weight_of(fit: &PatchFit, point: &WeightedPoint, limit_m: f64) -> f64 {
     let [h, hu, hv] = fit.surface(&point.basis);
     let steepness = steepness([hu, hv]);
     let distance = (point.position[2] - h).abs() * steepness.sqrt();

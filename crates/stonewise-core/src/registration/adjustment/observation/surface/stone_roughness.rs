@@ -4,7 +4,7 @@ use super::layout::Layout;
 use super::local_motion::LocalMotion;
 use super::local_pair::LocalPair;
 use super::noise_estimate::{deviance_of_weighted, reweighted};
-use super::patches::{PatchPoints, pool_into_patches};
+use super::patches::{PatchChoice, pool_into_patches};
 use super::surface_noise::{NoiseFactors, SurfaceNoise};
 use crate::registration::adjustment::stone_vector::StoneVector;
 
@@ -13,9 +13,6 @@ use crate::registration::adjustment::stone_vector::StoneVector;
 const ROUGHNESS_SD: f64 = 1.2;
 /// Largest number of patches used; one alone tells a factor of two in roughness.
 const PATCHES: usize = 4;
-/// Fraction of the patches from one that is used to the next, modulo one: the golden ratio, so that they lie neither in
-/// one row nor in one column.
-const NEXT_PATCH: f64 = 0.618_033_988_75;
 /// Step and range of the roughness.
 const STEP: f64 = 2.0;
 const ROUGHEST: f64 = 100.0;
@@ -38,8 +35,15 @@ pub(crate) fn likely_roughness(
         ..pair.noise
     });
     let motion = LocalMotion::new(motion);
-    let pooled = pool_into_patches(pair, &motion, &motion, &noise, layout);
-    let patches = reweighted(&some_of(pooled.list), &noise, layout);
+    let pooled = pool_into_patches(
+        pair,
+        &motion,
+        &motion,
+        &noise,
+        layout,
+        PatchChoice::AtMost(PATCHES),
+    );
+    let patches = reweighted(&pooled.list, &noise, layout);
     let value = |roughness: f64| {
         let prior = (roughness.ln() / ROUGHNESS_SD).powi(2);
         deviance_of_weighted(&patches, &noise.on_surface(roughness / present)) / inflation + prior
@@ -63,21 +67,6 @@ pub(crate) fn likely_roughness(
         true => smoother.0,
         false => search(STEP).0,
     }
-}
-
-/// At most [`PATCHES`] of a stone's patches, spread over the stone.
-fn some_of(patches: Vec<PatchPoints>) -> Vec<PatchPoints> {
-    let count = patches.len();
-    if count <= PATCHES {
-        return patches;
-    }
-    let chosen = (0..PATCHES).map(|k| (((k as f64 + 0.5) * NEXT_PATCH).fract() * count as f64) as usize);
-    let chosen: Vec<usize> = chosen.collect();
-    let patches = patches.into_iter().enumerate();
-    patches
-        .filter(|(i, _)| chosen.contains(i))
-        .map(|(_, patch)| patch)
-        .collect()
 }
 
 #[cfg(test)]
