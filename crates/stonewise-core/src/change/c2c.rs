@@ -32,8 +32,8 @@ pub fn c2c(reference: &GridIndex, points: &[Point3<f64>], max_m: f64) -> Vec<Opt
     distances
 }
 
-/// Points of which a thread finds the distances cube by cube: some columns of a scanner, and few enough that they stay in
-/// the processor's cache.
+/// Number of points that a thread processes at a time, cube by cube: a few columns of a scan, few enough to stay in the
+/// processor's cache.
 const CHUNK: usize = 16_384;
 /// Pairs of consecutive points that show whether points come in an order.
 const ORDER_SAMPLES: usize = 1000;

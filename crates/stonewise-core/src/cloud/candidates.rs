@@ -1,4 +1,4 @@
-//! Distances to the nearest point for points that follow each other.
+//! Distances to the nearest point, for consecutive points that lie close together.
 
 use super::grid_index::GridIndex;
 use nalgebra::Point3;
@@ -7,9 +7,9 @@ use std::array::from_fn;
 
 /// A multiple of the numbers in a vector of any processor.
 const LANES: usize = 8;
-/// Most candidates. Where more points lie around a cube, a search that begins in a small box is faster.
+/// Largest number of candidates. Where more points lie around a cube, a search that begins in a small box is faster.
 const MOST: usize = 512;
-/// Share of a cell within which a point finds its nearest one among the candidates: all of it but rounding.
+/// Distance, in cells, up to which the nearest point is among the candidates: a cell, less a margin for rounding.
 const REACH: f64 = 0.999;
 
 /// The points in a cube of 2 x 2 x 2 cells of an index and in the cells around it: the nearest point of a point in the
@@ -24,7 +24,7 @@ pub(crate) struct Candidates<'a> {
 }
 
 impl<'a> Candidates<'a> {
-    /// None yet, of an index.
+    /// An empty set of candidates of an index.
     pub fn new(index: &'a GridIndex) -> Self {
         Self {
             index,

@@ -162,7 +162,7 @@ impl GridIndex {
         }
     }
 
-    /// The cube of cells around a point in which it shares its candidates with its neighbours, see [`Candidates`].
+    /// The cube of cells that contains a point; all points in it have the same candidates for the nearest point.
     pub(super) fn cube_of(&self, p: &Point3<f64>) -> [usize; 3] {
         self.cell_of(p).map(|c| c / CUBE_CELLS)
     }
@@ -213,8 +213,8 @@ impl GridIndex {
         }
     }
 
-    /// Where in the index' order of blocks a point would lie, and in which cube of the block: searches for points in this
-    /// order find their cells in the processor's cache.
+    /// Where in the index' order of blocks a point would lie, and in which cube of the block: searches in this order
+    /// mostly hit the processor's cache.
     pub fn place_of(&self, p: &Point3<f64>) -> (u32, u8) {
         let bit = |c: usize| (c / CUBE_CELLS % CUBE_CELLS) as u8;
         let cell = self.cell_of(p);

@@ -112,7 +112,7 @@ fn pieces(points: &[Point2<f64>], params: &OutlineParams) -> Vec<Vec<Point2<f64>
         let at = (p - origin) / cell;
         seeds[at.y.round() as usize * width + at.x.round() as usize] = true;
     }
-    // Only depths up to one cell above `level` shape the contour, and that is below this reach.
+    // The contour depends only on depths up to `level` and one cell, which is less than `reach`.
     let reach = radius / cell + 2.0;
     let to_points = contour::distance(&seeds, width, reach);
     let outside: Vec<bool> = to_points.iter().map(|d| d * cell > radius).collect();

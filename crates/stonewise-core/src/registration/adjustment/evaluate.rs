@@ -114,7 +114,7 @@ impl Adjustment {
         self.surface.is_due(&candidate.surface, &candidate.motion)
     }
 
-    /// What the points of a stone say where it moved.
+    /// Evaluates the points of a stone at its present motions.
     fn evaluate_one(&self, i: usize, pair: &PairPoints) -> Evaluation {
         let stone = &self.stones[i];
         let mut local = self.local_pair(i, pair);
@@ -137,7 +137,7 @@ impl Adjustment {
                 noise: &self.surface.noise,
                 layout: &self.surface.layout,
             };
-            // Where the equations are missing, the noise has changed.
+            // Without equations the noise may have changed, and the earlier result for the halves no longer holds.
             let is_known = stone.with_field.surface.equations().is_some();
             let known = stone.ratio.halves.as_ref().filter(|_| is_known);
             test.run(self.surface.inflation_of_all(stone.surface()), known)

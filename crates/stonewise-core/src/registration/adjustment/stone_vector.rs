@@ -11,7 +11,7 @@ pub(crate) type Matrix9 = SMatrix<f64, 9, 9>;
 /// Distance of a stone's rim from its centroid, metres, at which rotation and bending are compared with translation: that
 /// of a block of 40 cm.
 const RIM_M: f64 = 0.2;
-/// Motions nearer to each other than this, metres, are alike: what a stone's points say at one of them, such as which
+/// Motions no farther apart than this, metres, are alike: what a stone's points say at one of them, such as which
 /// points are outliers, also holds at the other.
 const ALIKE_M: f64 = 1e-3;
 
@@ -68,7 +68,7 @@ impl StoneVector {
         d.translation().norm() + RIM_M * d.rotation().norm() + RIM_M * RIM_M * d.bending().norm()
     }
 
-    /// Whether points say much the same at both motions.
+    /// Whether the two motions are so near that what holds at one also holds at the other ([`ALIKE_M`]).
     pub fn is_alike(&self, other: &Self) -> bool {
         self.distance_m(other) <= ALIKE_M
     }

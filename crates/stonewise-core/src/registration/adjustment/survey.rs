@@ -314,7 +314,7 @@ mod tests {
         assert!(kept.windows(2).all(|k| k[1] - k[0] == kept[1] - kept[0]) && kept[kept.len() - 1] > 380);
     }
 
-    /// Pairs some batches of which cannot be read.
+    /// Pairs of which some batches cannot be read.
     struct Unreadable(MemoryPairs, &'static [usize]);
 
     #[derive(Debug, PartialEq, thiserror::Error)]

@@ -39,11 +39,12 @@ pub(crate) struct LikelihoodRatio {
     pub log_ratio: f64,
     /// Whether the stone's own motion is more likely, and one of its halves contradicts it.
     pub is_contradicted: bool,
-    /// What its halves say; `None` where the whole stone does not favour its own motion.
+    /// Result of testing the halves; `None` where the whole stone does not favour its own motion with the odds of a
+    /// contradiction.
     pub halves: Option<Halves>,
 }
 
-/// What the halves of a stone say between the two motions.
+/// Comparison of the two motions on the halves of a stone.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Halves {
     /// Log likelihood ratio of the half that favours the stone's own motion least.
@@ -53,9 +54,9 @@ pub(crate) struct Halves {
 }
 
 impl LikelihoodRatioTest<'_> {
-    /// `inflation`: factor on the points' variances, by which a log likelihood means less. `known`: what the halves said
-    /// before; they are not tested again while both motions stay alike. Cost: four fits of the surface, and sixteen more
-    /// for the halves.
+    /// `inflation`: factor on the points' variances, by which a log likelihood means less. `known`: earlier result for the
+    /// halves, reused if each motion is within a millimetre of what it was then. Cost: four fits of the surface;
+    /// sixteen more for the halves, where the points favour the stone's own motion and `known` does not hold.
     pub fn run(&self, inflation: f64, known: Option<&Halves>) -> LikelihoodRatio {
         let log_ratio = self.log_ratio();
         let limit = CONTRADICTION * inflation;
@@ -229,7 +230,7 @@ mod tests {
         let second = scan(2, |p| if p.y > -0.035 { own } else { Vector3::zeros() });
         let torn = compare(&second, &own);
         assert!(torn.log_ratio > 20.0 && torn.is_contradicted, "{torn:?}");
-        // What halves said counts as long as both motions are alike.
+        // An earlier result is reused as long as neither motion has changed by more than a millimetre.
         let agreeing = |own: &Vector3<f64>| Halves {
             least: 0.0,
             at: [Vector3::zeros(), *own].map(|d| placed(&d).motion),

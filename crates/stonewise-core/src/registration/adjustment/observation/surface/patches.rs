@@ -17,8 +17,8 @@ const MARGIN_CELLS: f64 = 2.0;
 /// epoch. The fit depends on where points lie between the cells, most for sharp points: if these moved over the cells,
 /// some motions would seem likelier by that alone.
 const HEAVIER: f64 = 2.0;
-/// Fraction of the patches from one that is used to the next, modulo one: the golden ratio, so that they lie neither in
-/// one row nor in one column.
+/// Step from one used patch to the next, as a fraction of the number of patches (modulo one): the inverse golden ratio,
+/// so that they lie neither in one row nor in one column.
 const NEXT_PATCH: f64 = 0.618_033_988_75;
 /// Shortest side of a patch, in cells: a cubic spline's four coefficients.
 const LEAST_CELLS: usize = 4;
@@ -35,7 +35,7 @@ pub(crate) struct PatchPoints {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PatchChoice {
     All,
-    /// Of more than two patches those of one colour of a chessboard, the colour that has more of them.
+    /// If there are more than two patches, those on one colour of a chessboard: the colour with more patches.
     EverySecond,
     /// At most this many, spread over the face.
     AtMost(usize),
@@ -82,7 +82,7 @@ pub(crate) fn pool_into_patches(
     };
     let cuts = Cuts::new(face, layout);
     let mut compare = CellSums::new(low, high, COMPARE_CELLS * layout.cell_m);
-    // Per patch the points of each epoch, by their places in its list.
+    // For each patch and epoch, the indices of its points in that epoch's list.
     let mut places = vec![[Vec::new(), Vec::new()]; cuts.count[0] * cuts.count[1]];
     for (epoch, points) in [&first, &second].into_iter().enumerate() {
         for (place, (_, p)) in points.iter().enumerate() {
@@ -152,7 +152,7 @@ impl Cuts {
         [patch % self.count[0], patch / self.count[0]]
     }
 
-    /// The patches that are used, of these.
+    /// Those of `patches` that are used.
     fn chosen(&self, mut patches: Vec<usize>, choice: PatchChoice) -> Vec<usize> {
         let count = patches.len();
         match choice {
