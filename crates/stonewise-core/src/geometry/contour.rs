@@ -3,11 +3,11 @@
 use super::ring::signed_area;
 use nalgebra::Point2;
 
-/// Euclidean distance, in cells, from every cell to the nearest marked one; infinite beyond `reach`, which must be below
-/// 4,096, so that squares are exact.
+/// Euclidean distance, in cells, from every cell to the nearest marked one; infinite beyond `reach`, which must be
+/// below 4,096, so that squares are exact.
 ///
-/// `marked`: row-major, `width * height`. Distances along columns first, then the least sum of squares along rows (Saito
-/// & Toriwaki 1994), in loops that the compiler vectorises. Cost: cells times reach.
+/// `marked`: row-major, `width * height`. Distances along columns first, then the least sum of squares along rows
+/// (Saito & Toriwaki 1994), in loops that the compiler vectorises. Cost: cells times reach.
 pub(super) fn distance(marked: &[bool], width: usize, reach: f64) -> Vec<f64> {
     let mut along: Vec<f32> = marked
         .iter()

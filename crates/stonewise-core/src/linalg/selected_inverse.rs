@@ -16,8 +16,8 @@ pub(crate) struct SelectedInverse<const B: usize> {
 }
 
 impl<const B: usize> BlockFactor<'_, B> {
-    /// Blocks of A^-1 on the pattern of A (Takahashi, Fagan & Chen 1973), level by level from the roots of the elimination
-    /// tree; the supernodes of a level are computed in parallel.
+    /// Blocks of A^-1 on the pattern of A (Takahashi, Fagan & Chen 1973), level by level from the roots of the
+    /// elimination tree; the supernodes of a level are computed in parallel.
     ///
     /// Cost: about twice that of the factor.
     pub fn selected_inverse(&self) -> Option<SelectedInverse<B>> {

@@ -70,8 +70,8 @@ impl Adjustment {
             .enumerate()
             .map(|(i, places)| self.elsewhere(i, places))
             .collect();
-        for group in points.groups(|i| !elsewhere[i].is_empty()) {
-            let is_far = |i: usize| !elsewhere[i].is_empty();
+        let is_far = |i: usize| !elsewhere[i].is_empty();
+        for group in points.groups(is_far) {
             let found = points.of_stones(&group, is_far, |i, pair| self.returned(i, pair, &elsewhere[i]))?;
             for (i, place) in found.into_iter().filter_map(|(i, place)| Some((i, place?))) {
                 self.put(i, place);

@@ -8,8 +8,8 @@ pub(crate) type Vector9 = SVector<f64, 9>;
 /// A matrix over nine unknowns.
 pub(crate) type Matrix9 = SMatrix<f64, 9, 9>;
 
-/// Distance of a stone's rim from its centroid, metres, at which rotation and bending are compared with translation: that
-/// of a block of 40 cm.
+/// Distance of a stone's rim from its centroid, metres, at which rotation and bending are compared with translation:
+/// that of a block of 40 cm.
 const RIM_M: f64 = 0.2;
 /// Motions no farther apart than this, metres, are alike: what a stone's points say at one of them, such as which
 /// points are outliers, also holds at the other.

@@ -59,8 +59,8 @@ impl<S: PairSource> Points<'_, S> {
         due.chunks(ahead()).map(<[usize]>::to_vec).collect()
     }
 
-    /// Runs `work` on the stones of these batches for which `is_due`; returns the results in order. The batches are read
-    /// and processed in parallel; if several fail, the error of the first is returned.
+    /// Runs `work` on the stones of these batches for which `is_due`; returns the results in order. The batches are
+    /// read and processed in parallel; if several fail, the error of the first is returned.
     pub fn of_stones<T: Send>(
         &self,
         group: &[usize],

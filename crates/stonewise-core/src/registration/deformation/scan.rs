@@ -197,8 +197,8 @@ impl<'a> Model<'a> {
         }
         let explained = self.inverse * with_rigid;
         let information = plain - with_rigid.transpose() * explained;
-        // The covariance of the unknowns' part less what the rigid motion takes up, term by term: few unknowns act on the
-        // stones of a small bulge, all on the rigid motion.
+        // The covariance of the unknowns' part less what the rigid motion takes up, term by term: few unknowns act on
+        // the stones of a small bulge, all on the rigid motion.
         let spread = self.body.shared.spread(&of_shared);
         let both = spread.transpose() * &self.of_shared * explained;
         let shared = of_shared.transpose() * spread - both - both.transpose()

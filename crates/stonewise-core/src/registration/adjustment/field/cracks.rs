@@ -31,7 +31,8 @@ const DIRECTIONS: usize = 12;
 const PITCH: f64 = 0.5;
 /// Stones that a side needs; fewer are loose stones, not a side.
 const SIDE_STONES: usize = 10;
-/// Lines that are tested exactly: those over which the motion changes most. Each costs a solve with three right-hand sides.
+/// Lines that are tested exactly: those over which the motion changes most. Each costs a solve with three right-hand
+/// sides.
 const TESTED: usize = 150;
 /// Probability of finding a line, anywhere, in a wall without one.
 const FALSE_ALARM: f64 = 1e-4;

@@ -19,8 +19,8 @@ pub(crate) struct Jump {
 /// Estimates, for each way to part the stones into two sides, the common jump of the stones marked `true`.
 ///
 /// The jump is three more unknowns of the adjustment: with P the matrix of the field and Q the jump's
-/// columns, its information is R - Q' P^-1 Q, and P need not be factored again. Cost: one solve with three right-hand sides for each way.
-/// `None` where the equations cannot be factored.
+/// columns, its information is R - Q' P^-1 Q, and P need not be factored again. Cost: one solve with three right-hand
+/// sides for each way. `None` where the equations cannot be factored.
 pub(crate) fn test_jumps(problem: &FieldProblem, sides: &[Vec<bool>]) -> Option<Vec<Jump>> {
     let normal = normal_equations(problem)?;
     let of_stone: Vec<(Matrix9, Vector9)> = normal

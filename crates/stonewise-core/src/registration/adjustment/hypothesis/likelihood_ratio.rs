@@ -54,8 +54,8 @@ pub(crate) struct Halves {
 }
 
 impl LikelihoodRatioTest<'_> {
-    /// `inflation`: factor on the points' variances, by which a log likelihood means less. `known`: earlier result for the
-    /// halves, reused if each motion is within a millimetre of what it was then. Cost: four fits of the surface;
+    /// `inflation`: factor on the points' variances, by which a log likelihood means less. `known`: earlier result for
+    /// the halves, reused if each motion is within a millimetre of what it was then. Cost: four fits of the surface;
     /// sixteen more for the halves, where the points favour the stone's own motion and `known` does not hold.
     pub fn run(&self, inflation: f64, known: Option<&Halves>) -> LikelihoodRatio {
         let log_ratio = self.log_ratio();

@@ -18,8 +18,8 @@ use stonewise_core::registration::{
     MatchedPair, NearPoint, PairPlaces, PairPoints, PairSource, StoneExtents, Window, stone_points,
 };
 
-/// Stones in a batch: at 20,000 points an epoch, 30 MB, and twice as much while it is read. Up to eight are in memory at a
-/// time.
+/// Stones in a batch: at 20,000 points an epoch, 30 MB, and twice as much while it is read. Up to eight are in memory
+/// at a time.
 const BATCH: usize = 64;
 
 /// Matched pairs whose points lie in one file a batch.
@@ -79,10 +79,10 @@ impl DiskPairs {
         })
     }
 
-    /// Writes the file of a batch, which every iteration reads again: for each pair the points of the first epoch, of the
-    /// second, and of those near the stone in the second without its label. Each list is its number of points, then their
-    /// offsets from the stone's centroid in the first epoch, metres; little-endian, 32 bits each. Returns the windows in
-    /// which the points count.
+    /// Writes the file of a batch, which every iteration reads again: for each pair the points of the first epoch, of
+    /// the second, and of those near the stone in the second without its label. Each list is its number of points, then
+    /// their offsets from the stone's centroid in the first epoch, metres; little-endian, 32 bits each. Returns the
+    /// windows in which the points count.
     fn write_batch(
         &self,
         bins: &SpillBins<u32>,

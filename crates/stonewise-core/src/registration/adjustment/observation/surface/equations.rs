@@ -197,8 +197,8 @@ impl Setting<'_> {
     }
 }
 
-/// The points of an epoch on a patch, and the sums to which they are added. The loop is compiled for the widest vectors of
-/// the processor.
+/// The points of an epoch on a patch, and the sums to which they are added. The loop is compiled for the widest vectors
+/// of the processor.
 struct EpochPoints<'a> {
     setting: &'a Setting<'a>,
     epoch: usize,

@@ -193,7 +193,8 @@ mod tests {
     use super::*;
     use crate::registration::adjustment::stone_vector::StoneVector;
 
-    /// A flat face of 1 x 0.8 m, points every centimetre in both epochs: six by five patches of 18 cells of a centimetre.
+    /// A flat face of 1 x 0.8 m, points every centimetre in both epochs: six by five patches of 18 cells of a
+    /// centimetre.
     fn chosen(choice: PatchChoice) -> Vec<PatchPoints> {
         let points: Vec<[f64; 3]> = (0..8000)
             .map(|k| [0.01 * f64::from(k % 100), 0.01 * f64::from(k / 100), 0.0])
