@@ -11,6 +11,7 @@ const LANES: usize = 8;
 
 /// Columns of the lower triangle; column `j` holds rows `j ..= j + half`, missing ones are zero, then zeros
 /// up to the stride, so that whole vectors of a panel's columns can be read.
+#[derive(Clone)]
 pub(crate) struct Band {
     size: usize,
     half: usize,

@@ -349,6 +349,7 @@ fn a_zone_that_creeps_in_the_face_is_shown_and_the_rest_stays_where_it_is() {
     let square: f64 = stones.iter().map(|(_, by)| by * by).sum();
     let rest: Vec<f64> = stones.iter().filter(|s| s.1 == 0.0).map(|s| s.0.z).collect();
     let rms = (rest.iter().map(|z| z * z).sum::<f64>() / rest.len() as f64).sqrt();
+    assert!(report.converged);
     // One drift for the whole wall shows half.
     assert!(shown / square > 0.7, "{}", shown / square);
     assert!(rms < 2e-4, "{rms}");

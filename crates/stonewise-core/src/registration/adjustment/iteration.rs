@@ -19,7 +19,7 @@ pub(super) struct Run<'a, S> {
     /// Solution of the last iteration.
     last: Option<Solution>,
     iterations: usize,
-    /// Most iterations; each crack that is found adds as many again.
+    /// Most iterations; each crack or zone that is found adds as many again.
     allowed: usize,
 }
 
@@ -60,6 +60,11 @@ impl<'a, S: PairSource> Run<'a, S> {
     /// Sets how exactly stones are evaluated from now on; the last iteration is exact whatever is set.
     pub fn set_effort(&mut self, effort: Effort) {
         self.adjustment.set_effort(effort);
+    }
+
+    /// Whether the variance components are kept, see [`Adjustment::keeps_components`].
+    pub fn keeps_components(&self) -> bool {
+        self.adjustment.keeps_components()
     }
 
     /// Tracks the stones in the photos from where they are now.

@@ -40,7 +40,7 @@ impl Adjustment {
     /// # Errors
     /// The caller stopped the work.
     pub fn components_of_wall(&self, progress: &dyn Progress) -> Result<VarianceComponents, Interrupted> {
-        if self.prior.zones > 0 {
+        if self.keeps_components() {
             return Ok(self.prior.components);
         }
         let equations = self.without_error();
@@ -49,6 +49,11 @@ impl Adjustment {
             None => most_likely_components(&problem, progress),
             Some(part) => most_likely_components(&part.restrict(&problem), progress),
         }
+    }
+
+    /// Whether the variance components are kept, not estimated: they are once a zone creeps.
+    pub fn keeps_components(&self) -> bool {
+        self.prior.zones > 0
     }
 
     /// Equations of the stones' points for any error in the face.
@@ -143,7 +148,7 @@ impl Adjustment {
                 &self.prior.least,
                 &mut self.prior.ties,
             );
-            if self.prior.zones == 0 {
+            if !self.keeps_components() {
                 self.prior.components = components;
             }
             field = self.solve(equations)?;

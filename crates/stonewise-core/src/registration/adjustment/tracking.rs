@@ -275,8 +275,8 @@ impl Adjustment {
     /// `turn`: what is known of a stone's rotation and bending; `None`: nothing.
     fn stones_in_photos(
         &self,
-        place: impl Fn(usize) -> [f64; 2],
-        turn: impl Fn(usize) -> Option<Turn>,
+        place: impl Fn(usize) -> [f64; 2] + Sync,
+        turn: impl Fn(usize) -> Option<Turn> + Sync,
     ) -> Vec<StoneInPhotos> {
         let of_stone = |(i, node): (usize, &super::field::Node)| StoneInPhotos {
             centroid: node.centroid,
@@ -288,7 +288,13 @@ impl Adjustment {
                 &turn(i).unwrap_or_else(Turn::open),
             ),
         };
-        self.prior.graph.nodes.iter().enumerate().map(of_stone).collect()
+        self.prior
+            .graph
+            .nodes
+            .par_iter()
+            .enumerate()
+            .map(of_stone)
+            .collect()
     }
 
     /// The displacement in the face by the stone's own points alone, about the motion that it more probably

@@ -11,6 +11,7 @@ use super::problem::FieldProblem;
 use super::solve::Field;
 use crate::statistics::upper_median;
 use nalgebra::Vector3;
+use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::VecDeque;
 use std::f64::consts::PI;
@@ -31,8 +32,8 @@ const DIRECTIONS: usize = 12;
 const PITCH: f64 = 0.5;
 /// Stones that a side needs; fewer are loose stones, not a side.
 const SIDE_STONES: usize = 10;
-/// Lines that are tested exactly: those over which the motion changes most. Each costs a solve with three right-hand
-/// sides.
+/// Lines that are tested exactly: those over which the motion changes most. Each costs three right-hand sides of a
+/// solve.
 const TESTED: usize = 150;
 /// Probability of finding a line, anywhere, in a wall without one.
 const FALSE_ALARM: f64 = 1e-4;
@@ -58,7 +59,7 @@ pub(crate) fn find_crack(
         .collect();
     let tried = all.len() as f64;
     let mut ranked: Vec<(f64, Line)> = all
-        .into_iter()
+        .into_par_iter()
         .map(|line| {
             (
                 change_across(graph, field, &problem.ties, &line.sides(&chart)),

@@ -2,7 +2,8 @@
 
 use super::field_vector::stone_from_field;
 use super::problem::FieldProblem;
-use super::solve::{Normal, normal_equations};
+use super::solve::normal_equations;
+use crate::linalg::BlockFactor;
 use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use rayon::prelude::*;
@@ -16,60 +17,76 @@ pub(crate) struct Jump {
     pub excess: f64,
 }
 
+/// Ways that one solve tests: it reads the factor once for the right-hand sides of all of them.
+const WAYS: usize = 3;
+
 /// Estimates, for each way to part the stones into two sides, the common jump of the stones marked `true`.
 ///
 /// The jump is three more unknowns of the adjustment: with P the matrix of the field and Q the jump's
-/// columns, its information is R - Q' P^-1 Q, and P need not be factored again. Cost: one solve with three right-hand
-/// sides for each way. `None` where the equations cannot be factored.
+/// columns, its information is R - Q' P^-1 Q, and P need not be factored again. Cost: one solve for every
+/// [`WAYS`] ways, with three right-hand sides each. `None` where the equations cannot be factored.
 pub(crate) fn test_jumps(problem: &FieldProblem, sides: &[Vec<bool>]) -> Option<Vec<Jump>> {
     let normal = normal_equations(problem)?;
-    let of_stone: Vec<(Matrix9, Vector9)> = normal
-        .eliminated
-        .iter()
-        .zip(&problem.graph.nodes)
-        .map(|(own, node)| {
+    let stones = normal.eliminated.par_iter().zip(&problem.graph.nodes);
+    let of_stone: Vec<(Matrix9, Vector9)> = stones
+        .zip(&normal.state)
+        .map(|((own, node), state)| {
             let a = stone_from_field(&node.face_from_world);
-            (a.transpose() * own.information * a, a.transpose() * own.vector)
+            let information = a.transpose() * own.information * a;
+            (information, a.transpose() * own.vector - information * state)
         })
         .collect();
     Some(
         sides
-            .par_iter()
-            .map(|side| test_jump(&normal, &of_stone, side))
+            .par_chunks(WAYS)
+            .flat_map_iter(|ways| test_ways(&normal.factor, &of_stone, ways))
             .collect(),
     )
 }
 
-/// `of_stone`: each stone's equations of the field unknowns.
-fn test_jump(normal: &Normal, of_stone: &[(Matrix9, Vector9)], side: &[bool]) -> Jump {
-    let columns = of_stone.iter().zip(side).map(|((m, _), moved)| match moved {
-        true => m.fixed_columns::<3>(0).into_owned(),
-        false => SMatrix::<f64, 9, 3>::zeros(),
-    });
-    let solved = normal.factor.solve(&columns.collect::<Vec<_>>());
-    let mut information = Matrix3::zeros();
-    let mut vector = Vector3::zeros();
-
-    for i in (0..side.len()).filter(|&i| side[i]) {
-        let (m, v) = &of_stone[i];
-        information += m.fixed_view::<3, 3>(0, 0);
-        vector += (v - m * normal.state[i]).fixed_rows::<3>(0);
-        information -= m.fixed_rows::<3>(0) * solved[i];
-    }
-
-    let information = 0.5 * (information + information.transpose());
-    match information.cholesky() {
-        Some(factor) => {
-            let jump = factor.solve(&vector);
-            Jump {
-                jump,
-                excess: jump.dot(&vector),
-            }
+/// `of_stone`: information of each stone on the field unknowns, and what is left of its vector; `ways`: at most [`WAYS`].
+fn test_ways(factor: &BlockFactor<9>, of_stone: &[(Matrix9, Vector9)], ways: &[Vec<bool>]) -> Vec<Jump> {
+    let columns = of_stone.iter().enumerate().map(|(i, (m, _))| {
+        let mut columns = SMatrix::<f64, 9, { 3 * WAYS }>::zeros();
+        for (way, _) in ways.iter().enumerate().filter(|(_, side)| side[i]) {
+            columns
+                .fixed_columns_mut::<3>(3 * way)
+                .copy_from(&m.fixed_columns::<3>(0));
         }
-        None => Jump {
-            jump: Vector3::zeros(),
-            excess: 0.0,
-        },
+        columns
+    });
+    let solved = factor.solve(&columns.collect::<Vec<_>>());
+    let jump = |(way, side): (usize, &Vec<bool>)| {
+        let mut information = Matrix3::zeros();
+        let mut vector = Vector3::zeros();
+        for i in (0..side.len()).filter(|&i| side[i]) {
+            let (m, v) = &of_stone[i];
+            information += m.fixed_view::<3, 3>(0, 0);
+            vector += v.fixed_rows::<3>(0);
+            information -= m.fixed_rows::<3>(0) * solved[i].fixed_columns::<3>(3 * way);
+        }
+        Jump::of(&information, &vector)
+    };
+    ways.iter().enumerate().map(jump).collect()
+}
+
+impl Jump {
+    /// The jump that these equations determine; none where they do not.
+    fn of(information: &Matrix3<f64>, vector: &Vector3<f64>) -> Self {
+        let information = 0.5 * (information + information.transpose());
+        match information.cholesky() {
+            Some(factor) => {
+                let jump = factor.solve(vector);
+                Self {
+                    jump,
+                    excess: jump.dot(vector),
+                }
+            }
+            None => Self {
+                jump: Vector3::zeros(),
+                excess: 0.0,
+            },
+        }
     }
 }
 
@@ -133,8 +150,15 @@ mod tests {
     fn a_jump_is_that_of_an_adjustment_with_three_more_unknowns() {
         let wall = SmallWall::new(4, 3, 3);
         let problem = wall.problem(0.9);
-        let side: Vec<bool> = (0..12).map(|k| k % 4 >= 2).collect();
-        let found = test_jumps(&problem, std::slice::from_ref(&side)).unwrap()[0];
+        // More ways than one solve tests.
+        let sides: Vec<Vec<bool>> = (1..3)
+            .map(|row| (0..12).map(|k| k / 4 >= row).collect())
+            .chain((1..4).map(|column| (0..12).map(|k| k % 4 >= column).collect()))
+            .collect();
+        assert!(sides.len() > WAYS && sides.len() % WAYS > 0);
+        let found = test_jumps(&problem, &sides).unwrap();
+        let nobody = test_jumps(&problem, &[vec![false; 12]]).unwrap()[0];
+        assert_eq!((nobody.jump, nobody.excess), (Vector3::zeros(), 0.0));
         let mut matrix = prior(&wall.graph, &problem.components, &problem.ties, &problem.least);
         let of_stone: Vec<(Matrix9, Vector9)> = eliminate_own_motions(&problem, &problem.own_variances())
             .iter()
@@ -147,11 +171,14 @@ mod tests {
         for (d, (m, _)) in matrix.diagonal.iter_mut().zip(&of_stone) {
             *d += m;
         }
-        let expected = dense_jump(&matrix, &problem, &of_stone, &side);
-        assert!((found.jump - expected.jump).norm() < 1e-9 + 1e-6 * expected.jump.norm());
-        assert!(
-            (found.excess / expected.excess - 1.0).abs() < 1e-6,
-            "{found:?} {expected:?}"
-        );
+        assert_eq!(found.len(), sides.len());
+        for (found, side) in found.iter().zip(&sides) {
+            let expected = dense_jump(&matrix, &problem, &of_stone, side);
+            assert!((found.jump - expected.jump).norm() < 1e-9 + 1e-6 * expected.jump.norm());
+            assert!(
+                (found.excess / expected.excess - 1.0).abs() < 1e-6,
+                "{found:?} {expected:?}"
+            );
+        }
     }
 }

@@ -168,26 +168,33 @@ impl PhotoModel {
         let Some(poses) = problem.solve(bias_m, &of_used) else {
             return;
         };
+        let of_stone = |(k, &i): (usize, &usize)| {
+            let (stone, weights) = (&problem.stones[k], &poses.weights[k]);
+            let (information, vector, by_poses) = problem
+                .system(stone, weights, &poses.scatter)
+                .displacement(&poses)?;
+            let found = StonePhotos {
+                information,
+                vector,
+                place: self.tracks[i].place,
+                bias_factor: factors[i],
+                weights: self.stones[i].as_ref().map_or(BiasWeights::USUAL, |s| s.weights),
+                turn: problem.turn(stone, weights, &poses),
+                by_poses,
+            };
+            let shifts = found
+                .displacement()
+                .and_then(|d| problem.shifts(stone, weights, &poses, &d));
+            Some((found, shifts.unwrap_or_default()))
+        };
+        let of_stones: Vec<Option<(StonePhotos, Vec<PhotoShift>)>> =
+            used.par_iter().enumerate().map(of_stone).collect();
         let mut found = vec![None; stones.len()];
         let mut shifts = vec![Vec::new(); stones.len()];
-
-        for (k, (&i, stone)) in used.iter().zip(&problem.stones).enumerate() {
-            let system = problem.system(stone, &poses.weights[k], &poses.scatter);
-            found[i] = system
-                .displacement(&poses)
-                .map(|(information, vector, by_poses)| StonePhotos {
-                    information,
-                    vector,
-                    place: self.tracks[i].place,
-                    bias_factor: factors[i],
-                    weights: self.stones[i].as_ref().map_or(BiasWeights::USUAL, |s| s.weights),
-                    turn: problem.turn(stone, &poses.weights[k], &poses),
-                    by_poses,
-                });
-            let displacement = found[i].as_ref().and_then(StonePhotos::displacement);
-            shifts[i] = displacement
-                .and_then(|d| problem.shifts(stone, &poses.weights[k], &poses, &d))
-                .unwrap_or_default();
+        for (&i, of_used) in used.iter().zip(of_stones) {
+            if let Some((photos, of_photos)) = of_used {
+                (found[i], shifts[i]) = (Some(photos), of_photos);
+            }
         }
 
         let octaves = octave_patches(places, step_m, octaves);

@@ -15,9 +15,13 @@
 //! motions relative to each other.
 
 use super::evidence::{FaceShift, PhotoShift};
+use crate::linalg::DenseFactor;
 use crate::registration::octave_patches::OctavePatches;
 use crate::registration::photos::{Sight, Track};
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3xX, MatrixXx3, Point3, SMatrix, Vector2, Vector3};
+use nalgebra::{
+    DMatrix, DVector, Matrix2, Matrix3, Matrix3xX, Matrix6xX, MatrixXx3, Point3, SMatrix, Vector2, Vector3,
+};
+use rayon::prelude::*;
 use std::array::from_fn;
 use std::collections::BTreeMap;
 
@@ -60,6 +64,9 @@ const ROUNDS: usize = 6;
 const FREEDOM: f64 = 4.0;
 /// Start of the factor on the formal variances of matches: pixels of one patch are correlated.
 const START_FACTOR: f64 = 4.0;
+/// Partial sums of the normal equations, which are formed in parallel and need memory for a matrix each. The number is
+/// constant, so that results do not depend on the number of threads.
+const SUMS: usize = 4;
 
 /// The displacement of a stone's place on the face, as the clouds show it, in its frame.
 #[derive(Clone, Copy, Debug)]
@@ -116,14 +123,29 @@ pub(super) struct Poses {
 
 type StoneMatrix = SMatrix<f64, STONE, STONE>;
 
-/// The equations of a stone: its own unknowns, and the columns of poses that they meet.
+/// The equations of a stone's own unknowns.
 pub(super) struct StoneSystem {
     own: StoneMatrix,
     right: SMatrix<f64, STONE, 1>,
-    cross: DMatrix<f64>,
-    poses: DMatrix<f64>,
-    poses_right: DVector<f64>,
+    /// Indices of the unknowns of the poses in these equations.
     columns: Vec<usize>,
+    /// One column for each of them.
+    cross: Matrix6xX<f64>,
+}
+
+/// The normal equations of the poses. Only the lower triangle of the matrix is complete.
+struct PoseEquations {
+    matrix: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+/// What is left of the sights of a stone.
+#[derive(Clone, Copy, Default)]
+struct Misfit {
+    /// Sum of the weighted squares of the residuals.
+    square: f64,
+    /// Its redundancy.
+    redundancy: f64,
 }
 
 /// How the poses' equations follow the displacement of a stone by the clouds, in its frame.
@@ -285,7 +307,7 @@ impl PoseProblem<'_> {
     pub fn system(&self, stone: &PoseStone, weights: &[f64], scatter: &Scatter) -> StoneSystem {
         let sights = &stone.track.sights;
         let (own_count, shared_count) = (self.of_photo(), self.of_all());
-        let count = own_count * sights.len() + shared_count;
+        let first_shared = own_count * sights.len();
         let mut columns: Vec<usize> = sights
             .iter()
             .flat_map(|s| own_count * s.photo..own_count * (s.photo + 1))
@@ -294,33 +316,30 @@ impl PoseProblem<'_> {
         let mut system = StoneSystem {
             own: StoneMatrix::zeros(),
             right: SMatrix::zeros(),
-            cross: DMatrix::zeros(STONE, count),
-            poses: DMatrix::zeros(count, count),
-            poses_right: DVector::zeros(count),
+            cross: Matrix6xX::zeros(columns.len()),
             columns,
         };
 
         system.own[(2, 2)] = HEIGHT_M.powi(-2);
+        let mut of_all = SMatrix::<f64, STONE, SHARED>::zeros();
         for (k, (sight, w)) in sights.iter().zip(weights).enumerate() {
             let (own, pose, shared) = self.rows(stone, sight, scatter);
-            let weight = self.weight(sight, scatter.factor) * *w;
-            let mut row = DMatrix::zeros(2, count);
-            row.columns_mut(own_count * k, own_count)
-                .copy_from(&pose.columns(0, own_count));
-            row.columns_mut(own_count * sights.len(), shared_count)
-                .copy_from(&shared.columns(0, shared_count));
-            system.own += own.transpose() * weight * own;
-            system.right += own.transpose() * weight * sight.shift;
-            system.cross += own.transpose() * weight * &row;
-            system.poses += row.transpose() * weight * &row;
-            system.poses_right += row.transpose() * (weight * sight.shift);
+            let weighted = own.transpose() * self.weight(sight, scatter.factor) * *w;
+            system.own += weighted * own;
+            system.right += weighted * sight.shift;
+            let of_photo = weighted * pose;
+            let mut columns = system.cross.columns_mut(own_count * k, own_count);
+            columns.copy_from(&of_photo.columns(0, own_count));
+            of_all += weighted * shared;
         }
+        let mut columns = system.cross.columns_mut(first_shared, shared_count);
+        columns.copy_from(&of_all.columns(0, shared_count));
 
         system
     }
 
-    /// Adjusts the poses; `bias_m`: appearance bias, `None` where the equations cannot be solved. `weights`:
-    /// start.
+    /// Adjusts the poses; `None` where the equations cannot be solved. `bias_m`: appearance bias; `factors`: on its
+    /// variance, per stone.
     pub fn solve(&self, bias_m: f64, factors: &[f64]) -> Option<Poses> {
         let mut weights: Vec<Vec<f64>> = self
             .stones
@@ -337,25 +356,16 @@ impl PoseProblem<'_> {
         for _ in 0..ROUNDS {
             let (corrections, covariance) =
                 self.solve_weighted(&weights, &trust, &scatter, bias_m, factors)?;
-            let (mut square, mut redundancy) = (0.0, 0.0);
-            for (k, stone) in self.stones.iter().enumerate() {
-                let prior = self.prior(stone, trust[k], bias_m, factors[k]);
-                let Some(own) = self.own(stone, &weights[k], &scatter, &prior, &corrections) else {
-                    continue;
-                };
-                for (sight, w) in stone.track.sights.iter().zip(&mut weights[k]) {
-                    let r = self.residual(stone, sight, &own, &scatter, &corrections);
-                    let r2 = r.dot(&(self.weight(sight, scatter.factor) * r));
-                    square += *w * r2;
-                    redundancy += 2.0;
-                    *w = (FREEDOM + 2.0) / (FREEDOM + r2);
-                }
-                redundancy -= 5.0;
-                let apart = own.fixed_rows::<3>(3) - stone.clouds.mean;
-                let spread = prior.try_inverse().unwrap_or_else(Matrix3::zeros) * trust[k];
-                let r2 = spread.try_inverse().map_or(0.0, |i| apart.dot(&(i * apart)));
-                trust[k] = ((FREEDOM + 3.0) / (FREEDOM + r2)).min(1.0);
-            }
+            let weighted = self.stones.par_iter().zip(&mut weights).zip(&mut trust);
+            let misfits: Vec<Misfit> = weighted
+                .zip(factors)
+                .map(|(((stone, weights), trust), factor)| {
+                    let prior = self.prior(stone, *trust, bias_m, *factor);
+                    self.reweight(stone, weights, trust, &scatter, &prior, &corrections)
+                })
+                .collect();
+            let square: f64 = misfits.iter().map(|m| m.square).sum();
+            let redundancy: f64 = misfits.iter().map(|m| m.redundancy).sum();
             let redundancy = redundancy - self.first_shared() as f64;
             scatter.factor = (scatter.factor * square / redundancy.max(1.0)).max(1.0);
             let rows_px = self.scatter_of_rows(&corrections, &covariance, scatter.rows_px);
@@ -370,6 +380,36 @@ impl PoseProblem<'_> {
         }
 
         found
+    }
+
+    /// Weighs a stone's sights, and what its clouds say, anew by their residuals; the misfit with the former weights.
+    /// `prior`: information of the clouds.
+    fn reweight(
+        &self,
+        stone: &PoseStone,
+        weights: &mut [f64],
+        trust: &mut f64,
+        scatter: &Scatter,
+        prior: &Matrix3<f64>,
+        corrections: &DVector<f64>,
+    ) -> Misfit {
+        let mut misfit = Misfit::default();
+        let Some(own) = self.own(stone, weights, scatter, prior, corrections) else {
+            return misfit;
+        };
+        for (sight, w) in stone.track.sights.iter().zip(weights) {
+            let r = self.residual(stone, sight, &own, scatter, corrections);
+            let r2 = r.dot(&(self.weight(sight, scatter.factor) * r));
+            misfit.square += *w * r2;
+            misfit.redundancy += 2.0;
+            *w = (FREEDOM + 2.0) / (FREEDOM + r2);
+        }
+        misfit.redundancy -= 5.0;
+        let apart = own.fixed_rows::<3>(3) - stone.clouds.mean;
+        let spread = prior.try_inverse().unwrap_or_else(Matrix3::zeros) * *trust;
+        let r2 = spread.try_inverse().map_or(0.0, |i| apart.dot(&(i * apart)));
+        *trust = ((FREEDOM + 3.0) / (FREEDOM + r2)).min(1.0);
+        misfit
     }
 
     /// New standard deviations of the shifts of rows from the corrections found with `rows_px`: one step of
@@ -411,26 +451,68 @@ impl PoseProblem<'_> {
         factors: &[f64],
     ) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let count = self.unknowns();
-        let mut normal = DMatrix::<f64>::identity(count, count);
-        let mut right = DVector::<f64>::zeros(count);
-        for (k, stone) in self.stones.iter().enumerate() {
-            let mut system = self.system(stone, &weights[k], scatter);
-            let prior = self.prior(stone, trust[k], bias_m, factors[k]);
-            system.add_prior(&prior, &stone.clouds.mean);
-            let Some(own) = system.own.cholesky() else {
-                continue;
-            };
-            let reduced = &system.poses - system.cross.transpose() * own.solve(&system.cross);
-            let reduced_right = &system.poses_right - system.cross.transpose() * own.solve(&system.right);
-            for (r, &row) in system.columns.iter().enumerate() {
-                right[row] += reduced_right[r];
-                for (c, &column) in system.columns.iter().enumerate() {
-                    normal[(row, column)] += reduced[(r, c)];
+        let stones_each = self.stones.len().div_ceil(SUMS).max(1);
+        let chunks = self.stones.par_chunks(stones_each).enumerate();
+        let sums: Vec<PoseEquations> = chunks
+            .map(|(chunk, stones)| {
+                let mut equations = PoseEquations::zeros(count);
+                for (k, stone) in (chunk * stones_each..).zip(stones) {
+                    let prior = self.prior(stone, trust[k], bias_m, factors[k]);
+                    self.add_stone(&mut equations, stone, &weights[k], scatter, &prior);
                 }
-            }
+                equations
+            })
+            .collect();
+        let mut normal = PoseEquations {
+            matrix: DMatrix::identity(count, count),
+            right: DVector::zeros(count),
+        };
+        for sum in sums {
+            normal.matrix += sum.matrix;
+            normal.right += sum.right;
         }
-        let cholesky = normal.cholesky()?;
-        Some((cholesky.solve(&right), cholesky.inverse()))
+        let factor = DenseFactor::of(&normal.matrix)?;
+        Some((factor.solve(&normal.right), factor.inverse()))
+    }
+
+    /// Adds what a stone says of the poses, its own unknowns eliminated; `prior`: information of its clouds.
+    fn add_stone(
+        &self,
+        equations: &mut PoseEquations,
+        stone: &PoseStone,
+        weights: &[f64],
+        scatter: &Scatter,
+        prior: &Matrix3<f64>,
+    ) {
+        let mut system = self.system(stone, weights, scatter);
+        system.add_prior(prior, &stone.clouds.mean);
+        let Some(own) = system.own.cholesky() else {
+            return;
+        };
+        let (own_count, shared_count, first_shared) = (self.of_photo(), self.of_all(), self.first_shared());
+        let PoseEquations { matrix, right } = equations;
+        for (sight, w) in stone.track.sights.iter().zip(weights) {
+            let (_, pose, shared) = self.rows(stone, sight, scatter);
+            let weight = self.weight(sight, scatter.factor) * *w;
+            let (of_pose, of_shared) = (pose.transpose() * weight, shared.transpose() * weight);
+            let first = own_count * sight.photo;
+            let mut block = matrix.view_mut((first, first), (own_count, own_count));
+            block += (of_pose * pose).view((0, 0), (own_count, own_count));
+            let mut block = matrix.view_mut((first_shared, first), (shared_count, own_count));
+            block += (of_shared * pose).view((0, 0), (shared_count, own_count));
+            let mut block = matrix.view_mut((first_shared, first_shared), (shared_count, shared_count));
+            block += (of_shared * shared).view((0, 0), (shared_count, shared_count));
+            let mut rows = right.rows_mut(first, own_count);
+            rows += (of_pose * sight.shift).rows(0, own_count);
+            let mut rows = right.rows_mut(first_shared, shared_count);
+            rows += (of_shared * sight.shift).rows(0, shared_count);
+        }
+        let solved = own.solve(&system.cross).transpose();
+        equations.subtract(
+            &system.columns,
+            &(&solved * &system.cross),
+            &(solved * system.right),
+        );
     }
 
     /// Covariances of the right sides of the poses' equations that errors of the clouds over octaves of length cause,
@@ -443,6 +525,7 @@ impl PoseProblem<'_> {
         factors: &[f64],
     ) -> [DMatrix<f64>; 3] {
         let pulls: Vec<Option<Pull>> = (0..self.stones.len())
+            .into_par_iter()
             .map(|k| self.pull(k, poses, bias_m, factors[k]))
             .collect();
         let count = self.unknowns();
@@ -459,8 +542,10 @@ impl PoseProblem<'_> {
                 }
             }
             for pulled in patches {
-                for (row, of_row) in &pulled {
-                    for (column, of_column) in &pulled {
+                // A list is read faster than a tree.
+                let pulled: Vec<(usize, Vector3<f64>)> = pulled.into_iter().collect();
+                for (column, of_column) in &pulled {
+                    for (row, of_row) in &pulled {
                         for (axis, sum) in sums.iter_mut().enumerate() {
                             sum[(*row, *column)] += octave.share * of_row[axis] * of_column[axis];
                         }
@@ -560,6 +645,27 @@ impl PoseProblem<'_> {
         sight.shift
             - a * own
             - (pose.columns(0, own_count) * of_photo + shared.columns(0, shared_count) * of_shared)
+    }
+}
+
+impl PoseEquations {
+    fn zeros(count: usize) -> Self {
+        Self {
+            matrix: DMatrix::zeros(count, count),
+            right: DVector::zeros(count),
+        }
+    }
+
+    /// Subtracts equations of some of the unknowns, those with the indices `columns`.
+    fn subtract(&mut self, columns: &[usize], matrix: &DMatrix<f64>, right: &DVector<f64>) {
+        for (c, &column) in columns.iter().enumerate() {
+            self.right[column] -= right[c];
+            for (r, &row) in columns.iter().enumerate() {
+                if row >= column {
+                    self.matrix[(row, column)] -= matrix[(r, c)];
+                }
+            }
+        }
     }
 }
 

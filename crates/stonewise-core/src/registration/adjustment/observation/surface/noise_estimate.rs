@@ -4,7 +4,7 @@ use super::layout::Layout;
 use super::local_motion::LocalMotion;
 use super::local_pair::LocalPair;
 use super::patch_fit::PatchFit;
-use super::patch_grid::WeightedPoint;
+use super::patch_grid::{Observed, WeightedPoint};
 use super::patches::{PatchChoice, PatchPoints, pool_into_patches};
 use super::robust::robust_fit;
 use super::surface_noise::SurfaceNoise;
@@ -168,16 +168,18 @@ pub(super) fn reweighted(patches: &[PatchPoints], noise: &SurfaceNoise, layout: 
 }
 
 /// Minus twice the log marginal likelihood of the points with these weights, up to a constant.
-pub(super) fn deviance_of_weighted(patches: &[PatchPoints], noise: &SurfaceNoise) -> f64 {
+fn deviance_of_weighted(patches: &[PatchPoints], noise: &SurfaceNoise) -> f64 {
     let terms: Vec<f64> = patches
         .par_iter()
-        .map(|p| {
-            let epochs = [p.epochs[0].as_slice(), p.epochs[1].as_slice()];
-            let noise = &noise.on_surface(p.roughness);
-            PatchFit::new(p.grid, epochs, noise).map_or(UNSOLVABLE, |fit| fit.deviance(epochs, noise))
-        })
+        .map(|p| deviance_of_observed(p, p.observed(noise), noise))
         .collect();
     terms.iter().sum()
+}
+
+/// Minus twice the log marginal likelihood of a patch's points, up to a constant; `observed`: their normal equations.
+pub(super) fn deviance_of_observed(patch: &PatchPoints, observed: Observed, noise: &SurfaceNoise) -> f64 {
+    let noise = &noise.on_surface(patch.roughness);
+    PatchFit::of(patch.grid, observed, noise).map_or(UNSOLVABLE, |fit| fit.deviance(patch.points(), noise))
 }
 
 #[cfg(test)]

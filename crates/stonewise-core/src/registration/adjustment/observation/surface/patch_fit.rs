@@ -3,7 +3,7 @@
 //! Points of both epochs observe the surface with noise `sigma`; the coefficients are eliminated, which
 //! leaves the normal equations of the motion alone.
 
-use super::patch_grid::{Basis, PatchGrid, WeightedPoint};
+use super::patch_grid::{Basis, Observed, PatchGrid, WeightedPoint};
 use super::surface_noise::SurfaceNoise;
 use crate::linalg::{BandFactor, BandInverse};
 
@@ -21,9 +21,17 @@ pub(crate) struct PatchFit {
 impl PatchFit {
     /// The posterior mean of the surface; `None` where the points do not determine one.
     pub fn new(grid: PatchGrid, epochs: [&[WeightedPoint]; 2], noise: &SurfaceNoise) -> Option<Self> {
-        let (matrix, rhs) = grid.assemble(epochs, noise);
+        Self::of(grid, grid.observed(epochs, noise), noise)
+    }
+
+    /// The posterior mean of the surface, from what the points say of its coefficients.
+    pub fn of(grid: PatchGrid, observed: Observed, noise: &SurfaceNoise) -> Option<Self> {
+        let Observed {
+            mut matrix,
+            rhs: mut coefficients,
+        } = observed;
+        grid.add_prior(&mut matrix, noise.tau_m);
         let factor = matrix.factor()?;
-        let mut coefficients = rhs;
         factor.solve(&mut coefficients);
         let mut prior_quadratic = 0.0;
         grid.each_difference(|taps| {

@@ -33,6 +33,13 @@ pub(crate) struct PatchGrid {
     pub short: usize,
 }
 
+/// Normal equations of a patch's coefficients by its points, without the prior.
+#[derive(Clone)]
+pub(crate) struct Observed {
+    pub matrix: Band,
+    pub rhs: Vec<[f64; 1]>,
+}
+
 /// The basis functions that are not zero at a point: four along each axis of the grid, the short axis first.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Basis {
@@ -132,7 +139,8 @@ impl PatchGrid {
         }
     }
 
-    pub fn assemble(&self, epochs: [&[WeightedPoint]; 2], noise: &SurfaceNoise) -> (Band, Vec<[f64; 1]>) {
+    /// What the points of both epochs say of the coefficients.
+    pub fn observed(&self, epochs: [&[WeightedPoint]; 2], noise: &SurfaceNoise) -> Observed {
         let [short, _] = self.counts();
         let mut matrix = Band::zeros(self.coefficient_count(), 3 * short + 3);
         let mut rhs = vec![[0.0]; self.coefficient_count()];
@@ -144,8 +152,13 @@ impl PatchGrid {
                 rhs: &mut rhs,
             });
         }
+        Observed { matrix, rhs }
+    }
+
+    /// Adds the information of the prior on the coefficients; `tau_m`: standard deviation of their second differences.
+    pub fn add_prior(&self, matrix: &mut Band, tau_m: f64) {
+        let scale = 1.0 / (tau_m * tau_m);
         self.each_difference(|taps| {
-            let scale = 1.0 / (noise.tau_m * noise.tau_m);
             for &(i, ci) in taps {
                 for &(j, cj) in taps {
                     if j <= i {
@@ -156,9 +169,8 @@ impl PatchGrid {
         });
         // Keeps a patch whose points lie on a line solvable; far below any observation's weight.
         for i in 0..self.coefficient_count() {
-            matrix.add(i, i, RIDGE / (noise.tau_m * noise.tau_m));
+            matrix.add(i, i, RIDGE / (tau_m * tau_m));
         }
-        (matrix, rhs)
     }
 
     /// The prior's second differences: along each axis, and mixed (twice, as in a thin plate).

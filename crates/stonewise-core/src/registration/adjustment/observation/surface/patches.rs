@@ -4,7 +4,7 @@ use super::cells::{COMPARE_CELLS, CellSums};
 use super::layout::Layout;
 use super::local_motion::{LocalMotion, Still};
 use super::local_pair::LocalPair;
-use super::patch_grid::{PatchGrid, WeightedPoint};
+use super::patch_grid::{Observed, PatchGrid, WeightedPoint};
 use super::surface_noise::SurfaceNoise;
 use std::collections::BTreeSet;
 
@@ -29,6 +29,19 @@ pub(crate) struct PatchPoints {
     pub epochs: [Vec<WeightedPoint>; 2],
     /// Roughness of the stone over that of most.
     pub roughness: f64,
+}
+
+impl PatchPoints {
+    /// The points of each epoch.
+    pub fn points(&self) -> [&[WeightedPoint]; 2] {
+        let [first, second] = &self.epochs;
+        [first, second]
+    }
+
+    /// What they say of the patch's coefficients, with these weights.
+    pub fn observed(&self, noise: &SurfaceNoise) -> Observed {
+        self.grid.observed(self.points(), noise)
+    }
 }
 
 /// Which patches of a face are used.

@@ -3,7 +3,8 @@
 use super::layout::Layout;
 use super::local_motion::LocalMotion;
 use super::local_pair::LocalPair;
-use super::noise_estimate::{deviance_of_weighted, reweighted};
+use super::noise_estimate::{deviance_of_observed, reweighted};
+use super::patch_grid::Observed;
 use super::patches::{PatchChoice, pool_into_patches};
 use super::surface_noise::{NoiseFactors, SurfaceNoise};
 use crate::registration::adjustment::stone_vector::StoneVector;
@@ -44,9 +45,16 @@ pub(crate) fn likely_roughness(
         PatchChoice::AtMost(PATCHES),
     );
     let patches = reweighted(&pooled.list, &noise, layout);
+    // They do not depend on the roughness.
+    let observed: Vec<Observed> = patches.iter().map(|p| p.observed(&noise)).collect();
     let value = |roughness: f64| {
         let prior = (roughness.ln() / ROUGHNESS_SD).powi(2);
-        deviance_of_weighted(&patches, &noise.on_surface(roughness / present)) / inflation + prior
+        let noise = noise.on_surface(roughness / present);
+        let terms = patches.iter().zip(&observed);
+        let deviance: f64 = terms
+            .map(|(patch, observed)| deviance_of_observed(patch, observed.clone(), &noise))
+            .sum();
+        deviance / inflation + prior
     };
     let start = (present, value(present));
     let search = |factor: f64| {
