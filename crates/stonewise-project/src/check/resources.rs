@@ -20,9 +20,12 @@ use stonewise_segment::{Detector, StoneFinder, Weights};
 /// Disk that a point needs while a run works: tiles, labels, pairs of stones, the labelled cloud. Measured on
 /// surveys of 1 to 200 million points (docs/src/performance.md), rounded up.
 const DISK_PER_POINT: u64 = 90;
-/// Memory at rest, and per point: 185 MB at 1.3 million points, 404 MB at 5.2 million, 4.9 GB at 133 million.
+/// Memory at rest, for each of the first ten million points, most of it for photos, and for each other point: 238 MB at
+/// 1.3 million points, 466 MB at 5.2 million, 0.9 GB at 27 million, 1.1 GB at 105 million, 4.2 GB at 332 million.
 const MEMORY_BASE: u64 = 200 << 20;
-const MEMORY_PER_POINT: u64 = 45;
+const FIRST_POINTS: u64 = 10_000_000;
+const MEMORY_PER_FIRST_POINT: u64 = 52;
+const MEMORY_PER_OTHER_POINT: u64 = 14;
 /// Processor time per point, without the search for stones, where a tile takes [`SECONDS_PER_TILE`]: 28 us at 1.3
 /// million points, 29 at 5.2 million, 19 at 332 million. It depends on the number of stones, which is not known
 /// yet.
@@ -177,7 +180,9 @@ fn memory(project: &Project, points: u64) -> u64 {
 }
 
 fn memory_of_points(points: u64) -> u64 {
-    MEMORY_BASE.saturating_add(MEMORY_PER_POINT.saturating_mul(points))
+    let first = points.min(FIRST_POINTS);
+    let others = MEMORY_PER_OTHER_POINT.saturating_mul(points - first);
+    (MEMORY_BASE + MEMORY_PER_FIRST_POINT * first).saturating_add(others)
 }
 
 /// Whether a finding concerns free disk or memory, and not the survey.
@@ -234,6 +239,28 @@ mod tests {
         let unknown = look(None);
         assert_eq!(unknown.verdict, Verdict::Note);
         assert!(unknown.text.ends_with("not known here"), "{}", unknown.text);
+    }
+
+    /// Points of surveys, and the peak memory of their runs, MB: dam_small, fountain, and a sixteenth, a quarter and the
+    /// whole of a dam.
+    const MEASURED: [(u64, u64); 5] = [
+        (1_280_000, 238),
+        (5_200_000, 466),
+        (26_600_000, 903),
+        (104_600_000, 1_188),
+        (332_000_000, 4_200),
+    ];
+
+    #[test]
+    fn memory_is_enough_for_runs_that_were_measured_and_not_twice_as_much() {
+        for (points, megabytes) in MEASURED {
+            let counted = memory_of_points(points) / 1_000_000;
+            assert!(
+                (megabytes..2 * megabytes).contains(&counted),
+                "{points}: {counted} MB, measured {megabytes}"
+            );
+        }
+        assert_eq!(memory_of_points(u64::MAX), u64::MAX);
     }
 
     #[test]

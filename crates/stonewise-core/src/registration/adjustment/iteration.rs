@@ -178,7 +178,9 @@ impl<'r, 'a, S: PairSource> Evaluated<'r, 'a, S> {
     ) -> Result<Solved<'r, 'a, S>, AdjustError<S::Error>> {
         let stones = self.0.stones();
         let equations = self.0.adjustment.equations();
-        let field = solve(&mut self.0.adjustment, &equations).ok_or(AdjustError::Unsolvable { stones })?;
+        let field = solve(&mut self.0.adjustment, &equations)
+            .filter(|field| self.0.adjustment.is_finite(field))
+            .ok_or(AdjustError::Unsolvable { stones })?;
         Ok(Solved(self.0, Solution { equations, field }))
     }
 }

@@ -151,7 +151,7 @@ fn results(
 ) -> Vec<PairResult> {
     let shared = adjustment.shared_variances(1.0);
     let bodies = bodies(adjustment);
-    let stones = adjustment.stones.iter().zip(estimates).enumerate();
+    let stones = adjustment.stones.par_iter().zip(estimates).enumerate();
     stones
         .map(|(i, (stone, estimate))| PairResult {
             first: stone.info.first,

@@ -19,10 +19,11 @@ const CLEAR: f64 = 15.0;
 const LEAST: f64 = 5.0;
 
 /// How often the clouds are wrong, from the squared hidden share of each stone and the probability that they are
-/// wrong about it: one step of expectation maximisation (Dempster, Laird & Rubin 1977).
+/// wrong about it: one step of expectation maximisation (Dempster, Laird & Rubin 1977). At most one: stones of which
+/// little is hidden leave their neighbours for other reasons, too.
 pub(super) fn estimated_rate(stones: impl Iterator<Item = (f64, f64)>) -> f64 {
     let (hidden, wrong) = stones.fold((0.0, 0.0), |sum, stone| (sum.0 + stone.0, sum.1 + stone.1));
-    (STONES_EXPECTED * EXPECTED + wrong) / (STONES_EXPECTED + hidden)
+    ((STONES_EXPECTED * EXPECTED + wrong) / (STONES_EXPECTED + hidden)).min(1.0)
 }
 
 /// The rate of [`estimated_rate`] before any stone counts.
@@ -74,5 +75,7 @@ mod tests {
         assert!((rate(0, 0.0) - 0.03).abs() < 1e-15);
         assert!((rate(40, 0.0) - 0.015).abs() < 1e-15);
         assert!((rate(40_000, 0.4) - 0.4).abs() < 1e-3);
+        // A tenth of each is hidden, and half of them look wrong.
+        assert_eq!(estimated_rate((0..1000).map(|_| (0.01, 0.5))), 1.0);
     }
 }

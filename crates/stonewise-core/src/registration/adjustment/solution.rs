@@ -2,7 +2,7 @@
 
 use super::equations::StoneEquations;
 use super::field::{
-    Displacement, Field, FieldProblem, FieldStone, LeftOver, PhotoTerms, Prediction, Subgraph,
+    Displacement, Field, FieldProblem, FieldStone, FieldVector, LeftOver, PhotoTerms, Prediction, Subgraph,
     VarianceComponents, creeping_zone, estimated_share, find_crack, most_likely_components, posterior,
     probabilities_with_field, reweight_ties, solve,
 };
@@ -156,6 +156,12 @@ impl Adjustment {
         Some(field)
     }
 
+    /// Whether a field and the probabilities of the stones are numbers.
+    pub fn is_finite(&self, field: &Field) -> bool {
+        let moves = |state: &FieldVector| state.displacement().iter().all(|x| x.is_finite());
+        field.state.iter().all(moves) && self.stones.iter().all(|stone| stone.p_with_field.is_finite())
+    }
+
     /// Parts the wall along its most significant crack; whether there is one.
     ///
     /// The points alone decide: all stones of a side share the errors of their photos' poses, so that no number
@@ -234,9 +240,7 @@ impl Adjustment {
         let problem = self.problem(equations.iter().map(|e| &e.with_field));
         let on_own: Vec<Option<&NormalEquations>> = equations.iter().map(|e| e.on_own.as_ref()).collect();
         let stones = 0..self.stones.len();
-        let shares: Vec<f64> = stones
-            .map(|i| self.prior.loose.share + self.wrong_share(i))
-            .collect();
+        let shares: Vec<f64> = stones.map(|i| self.leaving_share(i)).collect();
         let shared = self.shared_variances(1.0);
         let probabilities = probabilities_with_field(&problem, &on_own, field, &shared, &shares);
         for (stone, p) in self.stones.iter_mut().zip(probabilities) {
@@ -355,6 +359,22 @@ mod tests {
         let (still, moved) = (Vector3::zeros(), Vector3::new(0.0, 0.008, 0.004));
         assert!(is_parted(moved, moved));
         assert!(!is_parted(still, moved));
+    }
+
+    #[test]
+    fn probabilities_are_finite_where_the_clouds_are_surely_wrong() {
+        let source = MemoryPairs::new(wall(5, [0.001; 2], |_| Vector3::zeros()));
+        let (mut adjustment, points) = begun(&source);
+        adjustment.estimate_noise(&points.sample);
+        adjustment.wrong_rate = 1.0;
+        for (stone, hidden) in [(20, 0.99), (21, 1.0)] {
+            adjustment.stones[stone].info.hidden = hidden;
+            assert!(adjustment.leaving_share(stone) <= 1.0);
+        }
+        let solution = solved(&mut adjustment, &points);
+        assert!(adjustment.is_finite(&solution.field));
+        adjustment.stones[20].p_with_field = f64::NAN;
+        assert!(!adjustment.is_finite(&solution.field));
     }
 
     #[test]

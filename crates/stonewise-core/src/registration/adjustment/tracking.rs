@@ -131,11 +131,12 @@ impl Adjustment {
                     };
                     tracker.track()
                 };
-                let starts = self.starts(i, surroundings[i], search_m);
-                Track::best_of(starts.into_iter().map(from).collect())
+                let own = self.face_motion(i);
+                let elsewhere = self.starts_elsewhere(i, &own, surroundings[i], search_m);
+                Track::best_of(from(own), elsewhere.into_iter().map(from))
             };
             let found = points.of_stones(&[batch], |_| true, track)?;
-            tracks.extend(found.into_iter().filter_map(|(_, track)| track));
+            tracks.extend(found.into_iter().map(|(_, track)| track));
             progress.advance(range.len() as u64);
         }
 
@@ -339,24 +340,29 @@ impl Adjustment {
         })
     }
 
-    /// Motions from which a stone is sought: its own, then those that in the face are the motion of its
+    /// Motions beside its own from which a stone is sought: those that in the face are the motion of its
     /// surroundings, of the wall as a whole and of the masks' centroids, each unless a search from one before
     /// reaches it. Out of the face the clouds alone measure it.
-    fn starts(&self, i: usize, surroundings: [Vector3<f64>; 2], search_m: f64) -> Vec<FaceMotion> {
+    fn starts_elsewhere(
+        &self,
+        i: usize,
+        own: &FaceMotion,
+        surroundings: [Vector3<f64>; 2],
+        search_m: f64,
+    ) -> Vec<FaceMotion> {
         let frame = &self.prior.graph.nodes[i].face_from_world;
-        let own = self.face_motion(i);
-        let mut starts = vec![own];
+        let mut starts = vec![*own];
         let [around, of_wall] = surroundings.map(|moved| frame * moved);
         for moved in [around, of_wall, self.stones[i].start] {
             let is_new = |s: &FaceMotion| (s.translation - moved).xy().norm() > search_m;
             if starts.iter().all(is_new) {
                 starts.push(FaceMotion {
                     translation: Vector3::new(moved.x, moved.y, own.translation.z),
-                    ..own
+                    ..*own
                 });
             }
         }
-        starts
+        starts.split_off(1)
     }
 
     fn face_motion(&self, i: usize) -> FaceMotion {

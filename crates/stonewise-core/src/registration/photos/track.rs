@@ -106,29 +106,33 @@ const SAME_PLACE_M: f64 = 0.005;
 const LIKELIER: f64 = 3.3;
 
 impl Track {
-    /// The track of a stone that was sought from several places, the most probable one beforehand first: the first
+    /// The track of a stone that was sought from several places, `own` being the most probable one beforehand: the first
     /// that was found, unless its photos are clearly more alike at another. None counts where they are more alike
     /// at another place, but not clearly.
-    pub fn best_of(tracks: Vec<Self>) -> Option<Self> {
+    pub fn best_of(own: Self, others: impl IntoIterator<Item = Self>) -> Self {
         let is_tracked = |t: &Self| t.status == PhotoStatus::Tracked;
-        let Some(first) = tracks.iter().position(is_tracked) else {
-            return tracks.into_iter().next();
+        let mut others = others.into_iter().filter(is_tracked);
+        let first = match is_tracked(&own) {
+            true => own,
+            false => match others.next() {
+                Some(found) => found,
+                None => return own,
+            },
         };
-        let likeliest = (0..tracks.len())
-            .filter(|&k| is_tracked(&tracks[k]))
-            .max_by(|&a, &b| tracks[a].likeness.total_cmp(&tracks[b].likeness).then(b.cmp(&a)))?;
-        let apart_m = (tracks[first].start.translation - tracks[likeliest].start.translation)
-            .xy()
-            .norm();
-        let gain = tracks[likeliest].likeness - tracks[first].likeness;
-        let is_ambiguous = apart_m > SAME_PLACE_M && gain < LIKELIER;
-        let mut best = tracks.into_iter().nth(likeliest)?;
-        if is_ambiguous {
+        let (start, likeness) = (first.start.translation, first.likeness);
+        let mut best = others.fold(first, |best, other| {
+            match other.likeness.total_cmp(&best.likeness).is_gt() {
+                true => other,
+                false => best,
+            }
+        });
+        let apart_m = (start - best.start.translation).xy().norm();
+        if apart_m > SAME_PLACE_M && best.likeness - likeness < LIKELIER {
             best.status = PhotoStatus::Ambiguous;
             best.sights.clear();
             best.pictures = None;
         }
-        Some(best)
+        best
     }
 }
 
@@ -396,10 +400,11 @@ mod tests {
     fn another_place_counts_where_the_photos_are_clearly_more_alike() {
         use PhotoStatus::{Ambiguous, NotFound, Tracked};
         let best = |tracks: &[(PhotoStatus, f64, f64)]| {
-            let tracks = tracks
+            let mut tracks = tracks
                 .iter()
                 .map(|&(status, place, likeness)| track(status, place, likeness));
-            let best = Track::best_of(tracks.collect()).unwrap();
+            let own = tracks.next().unwrap();
+            let best = Track::best_of(own, tracks);
             (best.status, best.start.translation.x)
         };
         assert_eq!(
@@ -420,7 +425,14 @@ mod tests {
             best(&[(NotFound, 0.05, 20.0), (Tracked, 0.0, 5.0)]),
             (Tracked, 0.0)
         );
-        assert_eq!(best(&[(NotFound, 0.05, 0.0)]), (NotFound, 0.05));
-        assert!(Track::best_of(Vec::new()).is_none());
+        assert_eq!(
+            best(&[(NotFound, 0.05, 0.0), (NotFound, 0.0, 9.0)]),
+            (NotFound, 0.05)
+        );
+        // The earlier of two that are equally alike.
+        assert_eq!(
+            best(&[(Tracked, 0.001, 9.0), (Tracked, 0.002, 9.0)]),
+            (Tracked, 0.001)
+        );
     }
 }

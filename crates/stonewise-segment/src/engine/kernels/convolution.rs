@@ -318,6 +318,7 @@ fn gather(x: &[f32], geometry: &Geometry, range: Range<usize>, patches: &mut Vec
 }
 
 /// Fills a row with every `stride`-th value of another.
+#[inline(always)]
 pub fn take_every(stride: usize, source: &[f32], target: &mut [f32]) {
     match stride {
         1 => target.copy_from_slice(&source[..target.len()]),

@@ -2,7 +2,7 @@
 
 use super::convolution::take_every;
 use super::same_padding::same_padding;
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -39,6 +39,7 @@ impl Depthwise {
     }
 
     /// Writes ReLU6 of the input rows that the output rows in `range` need to `held`, padded with zeros.
+    #[inline(always)]
     fn hold(&self, x: &[f32], range: &Range<usize>, held: &mut [f32]) {
         let [above, before] =
             [self.rows, self.columns].map(|side| same_padding(side, self.size, self.stride));
@@ -92,20 +93,50 @@ pub fn forward(x: &[f32], weight: &[f32], bias: &[f32], shape: &Depthwise) -> Ve
                 let first = strip * rows_at_once;
                 let range = first..first + y.len() / columns;
                 let held = &mut held[..held_rows(range.len()) * padded_row];
-                arch.dispatch(
-                    #[inline(always)]
-                    || {
-                        shape.hold(x, &range, held);
-                        for (row, y) in y.chunks_mut(columns).enumerate() {
-                            let seen = &held[row * shape.stride * padded_row..];
-                            add_products(seen, &offsets, weight, bias[channel], y);
-                        }
-                    },
-                );
+                arch.dispatch(Strip {
+                    shape,
+                    x,
+                    range,
+                    held,
+                    offsets: &offsets,
+                    weight,
+                    bias: bias[channel],
+                    y,
+                });
             }
         },
     );
     y
+}
+
+/// Some output rows of a channel. The loops are compiled for the widest vectors of the processor.
+struct Strip<'a> {
+    shape: &'a Depthwise,
+    /// The channel's input.
+    x: &'a [f32],
+    /// Which output rows.
+    range: Range<usize>,
+    /// Memory for the padded input rows that they need.
+    held: &'a mut [f32],
+    /// Of each weight's input, see [`Depthwise::offsets`].
+    offsets: &'a [usize],
+    weight: &'a [f32],
+    bias: f32,
+    y: &'a mut [f32],
+}
+
+impl WithSimd for Strip<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.shape.hold(self.x, &self.range, self.held);
+        let below = self.shape.stride * self.shape.stride * self.shape.part();
+        let columns = self.shape.output_size()[1];
+        for (row, y) in self.y.chunks_mut(columns).enumerate() {
+            add_products(&self.held[row * below..], self.offsets, self.weight, self.bias, y);
+        }
+    }
 }
 
 /// One output row.

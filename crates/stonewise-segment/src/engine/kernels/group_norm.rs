@@ -1,6 +1,6 @@
 //! Group normalisation (Wu & He 2018) on slices: batch, channel, pixel.
 
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Partial sums that are kept side by side, so that they can be added at once.
@@ -30,21 +30,15 @@ pub fn forward(
     let arch = Arch::new();
 
     let normalise = |(place, (x, y)): (usize, (&[f32], &mut [f32]))| {
-        arch.dispatch(
-            #[inline(always)]
-            || {
-                let moments = moments(x, epsilon);
-                let first = place % groups * per_group;
-                for (channel, (x, y)) in x.chunks(pixels).zip(y.chunks_mut(pixels)).enumerate() {
-                    let scale = scale[first + channel] * moments.inverse_std;
-                    let shift = shift[first + channel] - moments.mean * scale;
-                    for (y, x) in y.iter_mut().zip(x) {
-                        *y = x * scale + shift;
-                    }
-                }
-                moments
-            },
-        )
+        let first = place % groups * per_group;
+        arch.dispatch(Group {
+            x,
+            y,
+            pixels,
+            scale: &scale[first..],
+            shift: &shift[first..],
+            epsilon,
+        })
     };
 
     let parts = x
@@ -52,6 +46,36 @@ pub fn forward(
         .zip(y.par_chunks_mut(group_size.max(1)));
     let moments = parts.enumerate().map(normalise).collect();
     (y, moments)
+}
+
+/// A group of channels to normalise. The loops are compiled for the widest vectors of the processor.
+struct Group<'a> {
+    x: &'a [f32],
+    y: &'a mut [f32],
+    /// Pixels of a channel.
+    pixels: usize,
+    /// Of each channel, those of the group first.
+    scale: &'a [f32],
+    shift: &'a [f32],
+    epsilon: f32,
+}
+
+impl WithSimd for Group<'_> {
+    type Output = Moments;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Moments {
+        let moments = moments(self.x, self.epsilon);
+        let planes = self.x.chunks(self.pixels).zip(self.y.chunks_mut(self.pixels));
+        for ((x, y), (scale, shift)) in planes.zip(self.scale.iter().zip(self.shift)) {
+            let scale = scale * moments.inverse_std;
+            let shift = shift - moments.mean * scale;
+            for (y, x) in y.iter_mut().zip(x) {
+                *y = x * scale + shift;
+            }
+        }
+        moments
+    }
 }
 
 /// Derivatives with regard to values, scale and shift, from that with regard to the result.

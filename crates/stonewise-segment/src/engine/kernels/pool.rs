@@ -1,6 +1,6 @@
 //! The largest of neighbouring pixels, on slices: plane, row, column.
 
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Max pooling over 3 x 3 pixels with stride 2 and a border of 1, of planes of `rows` x `columns`.
@@ -16,19 +16,37 @@ pub fn halve(x: &[f32], [rows, columns]: [usize; 2]) -> Vec<f32> {
             let source = |row: usize| &x[row * columns..][..columns];
             let [middle, below] = [2 * row, (2 * row + 1).min(rows - 1)].map(source);
             let above = source((2 * row).saturating_sub(1));
-            Arch::new().dispatch(
-                #[inline(always)]
-                || {
-                    let rows = above.iter().zip(middle).zip(below);
-                    for (to, ((a, b), c)) in line.iter_mut().zip(rows) {
-                        *to = larger(larger(*a, *b), *c);
-                    }
-                    halve_line(line, y);
-                },
-            );
+            Arch::new().dispatch(Row {
+                rows: [above, middle, below],
+                line,
+                y,
+            });
         }
     });
     y
+}
+
+/// A row of the result. The loops are compiled for the widest vectors of the processor.
+struct Row<'a> {
+    /// The rows that it is computed from.
+    rows: [&'a [f32]; 3],
+    /// Memory for the largest of each column.
+    line: &'a mut [f32],
+    y: &'a mut [f32],
+}
+
+impl WithSimd for Row<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let [above, middle, below] = self.rows;
+        let rows = above.iter().zip(middle).zip(below);
+        for (to, ((a, b), c)) in self.line.iter_mut().zip(rows) {
+            *to = larger(larger(*a, *b), *c);
+        }
+        halve_line(self.line, self.y);
+    }
 }
 
 /// Derivative with regard to the values, from that with regard to the result: it belongs to the largest, to

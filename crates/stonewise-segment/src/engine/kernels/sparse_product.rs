@@ -1,7 +1,7 @@
 //! Products of sparse and dense matrices.
 
 use crate::engine::sparse::SparseMatrix;
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Rows that one thread takes at a time.
@@ -16,19 +16,35 @@ pub fn forward(matrix: &SparseMatrix, dense: &[f32], columns: usize) -> Vec<f32>
         .enumerate();
     let arch = Arch::new();
     rows.for_each(|(row, sums)| {
-        arch.dispatch(
-            #[inline(always)]
-            || {
-                for &(column, weight) in matrix.row(row) {
-                    let source = &dense[column as usize * columns..][..columns];
-                    for (sum, value) in sums.iter_mut().zip(source) {
-                        *sum += weight * value;
-                    }
-                }
-            },
-        );
+        arch.dispatch(Row {
+            entries: matrix.row(row),
+            dense,
+            sums,
+        });
     });
     product
+}
+
+/// A row of the product. The loop is compiled for the widest vectors of the processor.
+struct Row<'a> {
+    entries: &'a [(u32, f32)],
+    dense: &'a [f32],
+    sums: &'a mut [f32],
+}
+
+impl WithSimd for Row<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let columns = self.sums.len();
+        for &(column, weight) in self.entries {
+            let source = &self.dense[column as usize * columns..][..columns];
+            for (sum, value) in self.sums.iter_mut().zip(source) {
+                *sum += weight * value;
+            }
+        }
+    }
 }
 
 #[cfg(test)]

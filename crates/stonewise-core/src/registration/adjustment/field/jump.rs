@@ -1,6 +1,5 @@
 //! Common jumps of the motion between two sides of the wall.
 
-use super::field_vector::stone_from_field;
 use super::problem::FieldProblem;
 use super::solve::normal_equations;
 use crate::linalg::BlockFactor;
@@ -27,14 +26,9 @@ const WAYS: usize = 3;
 /// [`WAYS`] ways, with three right-hand sides each. `None` where the equations cannot be factored.
 pub(crate) fn test_jumps(problem: &FieldProblem, sides: &[Vec<bool>]) -> Option<Vec<Jump>> {
     let normal = normal_equations(problem)?;
-    let stones = normal.eliminated.par_iter().zip(&problem.graph.nodes);
+    let stones = normal.of_stones.iter().zip(&normal.state);
     let of_stone: Vec<(Matrix9, Vector9)> = stones
-        .zip(&normal.state)
-        .map(|((own, node), state)| {
-            let a = stone_from_field(&node.face_from_world);
-            let information = a.transpose() * own.information * a;
-            (information, a.transpose() * own.vector - information * state)
-        })
+        .map(|((information, vector), state)| (*information, vector - information * state))
         .collect();
     Some(
         sides
@@ -95,6 +89,7 @@ mod tests {
     use super::*;
     use crate::linalg::BlockMatrix;
     use crate::registration::adjustment::field::eliminate::eliminate_own_motions;
+    use crate::registration::adjustment::field::field_vector::stone_from_field;
     use crate::registration::adjustment::field::prior::prior;
     use crate::registration::adjustment::field::testing::SmallWall;
     use nalgebra::{DMatrix, DVector};
@@ -155,7 +150,7 @@ mod tests {
             .map(|row| (0..12).map(|k| k / 4 >= row).collect())
             .chain((1..4).map(|column| (0..12).map(|k| k % 4 >= column).collect()))
             .collect();
-        assert!(sides.len() > WAYS && sides.len() % WAYS > 0);
+        assert!(sides.len() > WAYS && !sides.len().is_multiple_of(WAYS));
         let found = test_jumps(&problem, &sides).unwrap();
         let nobody = test_jumps(&problem, &[vec![false; 12]]).unwrap()[0];
         assert_eq!((nobody.jump, nobody.excess), (Vector3::zeros(), 0.0));

@@ -31,6 +31,8 @@ pub(crate) struct Normal<'a> {
     pub state: Vec<Vector9>,
     /// Each stone's equations of the field's motion in its frame, its own motion eliminated.
     pub eliminated: Vec<Eliminated>,
+    /// The same as equations of the field's unknowns: information and vector.
+    pub of_stones: Vec<(Matrix9, Vector9)>,
 }
 
 /// The normal equations of the field, where the motions of stones beside it are as the problem's components and loose
@@ -47,21 +49,24 @@ pub(crate) fn information(problem: &FieldProblem) -> (BlockMatrix<9>, Vec<Matrix
     let mut matrix = prior(problem.graph, &problem.components, &problem.ties, &problem.least);
     let of_stones = of_stones(problem, &eliminated);
     add_stones(&mut matrix, &of_stones);
-    (matrix, of_stones)
+    (matrix, of_stones.into_iter().map(|s| s.0).collect())
 }
 
-/// What the stones say of the field's unknowns.
-fn of_stones(problem: &FieldProblem, eliminated: &[Eliminated]) -> Vec<Matrix9> {
+/// What the stones say of the field's unknowns: information and vector.
+fn of_stones(problem: &FieldProblem, eliminated: &[Eliminated]) -> Vec<(Matrix9, Vector9)> {
     let of_stone = |(i, stone): (usize, &Eliminated)| {
         let a = stone_from_field(&problem.graph.nodes[i].face_from_world);
-        a.transpose() * stone.information * a
+        (
+            a.transpose() * stone.information * a,
+            a.transpose() * stone.vector,
+        )
     };
     eliminated.par_iter().enumerate().map(of_stone).collect()
 }
 
-fn add_stones(matrix: &mut BlockMatrix<9>, of_stones: &[Matrix9]) {
+fn add_stones(matrix: &mut BlockMatrix<9>, of_stones: &[(Matrix9, Vector9)]) {
     let diagonal = matrix.diagonal.iter_mut().zip(of_stones);
-    diagonal.for_each(|(sum, of_stone)| *sum += of_stone);
+    diagonal.for_each(|(sum, (information, _))| *sum += information);
 }
 
 /// `matrix`: the information of the prior.
@@ -70,18 +75,16 @@ pub(crate) fn assemble<'a>(
     mut matrix: BlockMatrix<9>,
     eliminated: Vec<Eliminated>,
 ) -> Option<Normal<'a>> {
-    let mut rhs = vec![Vector9::zeros(); eliminated.len()];
-    add_stones(&mut matrix, &of_stones(problem, &eliminated));
-    for (i, stone) in eliminated.iter().enumerate() {
-        let a = stone_from_field(&problem.graph.nodes[i].face_from_world);
-        rhs[i] = a.transpose() * stone.vector;
-    }
+    let of_stones = of_stones(problem, &eliminated);
+    add_stones(&mut matrix, &of_stones);
     let factor = problem.graph.pattern.factor(&matrix)?;
-    let state = factor.solve(&rhs);
+    let right: Vec<Vector9> = of_stones.iter().map(|s| s.1).collect();
+    let state = factor.solve(&right);
     Some(Normal {
         factor,
         state,
         eliminated,
+        of_stones,
     })
 }
 
