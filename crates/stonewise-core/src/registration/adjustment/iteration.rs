@@ -62,11 +62,6 @@ impl<'a, S: PairSource> Run<'a, S> {
         self.adjustment.set_effort(effort);
     }
 
-    /// Whether the variance components are kept, see [`Adjustment::keeps_components`].
-    pub fn keeps_components(&self) -> bool {
-        self.adjustment.keeps_components()
-    }
-
     /// Tracks the stones in the photos from where they are now.
     pub fn track(&mut self, photos: &dyn PhotoSource<S::Error>) -> Result<(), AdjustError<S::Error>> {
         self.adjustment.track(&self.points, photos)

@@ -16,8 +16,7 @@ const ALIGNMENTS: usize = 4;
 /// changes by a percent in between.
 const NOISE_EVERY: usize = 2;
 /// Iterations in which the weights of stones and ties settle, and in which of them the variance components
-/// are estimated once more: an estimate moves the weights, which need an iteration to follow. Where the components are
-/// kept, weighing begins at the round of the last estimate: only the weights must follow.
+/// are estimated once more: an estimate moves the weights, which need an iteration to follow.
 const WEIGHINGS: usize = 5;
 const COMPONENTS_IN: [usize; 2] = [0, 2];
 /// Most cracks of the whole wall that are sought; each costs another adjustment.
@@ -105,14 +104,11 @@ impl<'a, S: PairSource> Probed<'a, S> {
 pub(super) struct Tracked<'a, S>(Run<'a, S>);
 
 impl<'a, S: PairSource> Tracked<'a, S> {
-    /// Estimates the variance components, unless they are kept; the weights of stones and ties, and the photos' poses,
-    /// follow.
+    /// Estimates the variance components; the weights of stones and ties, and the photos' poses, follow.
     pub fn weigh(self) -> Phase<Weighed<'a, S>, S> {
         let mut run = self.0;
         run.set_effort(Effort::Weighing);
-        let [begin, last] = COMPONENTS_IN;
-        let first = if run.keeps_components() { last } else { begin };
-        for round in first..WEIGHINGS {
+        for round in 0..WEIGHINGS {
             let Some(iteration) = run.begin() else { break };
             let mut evaluated = iteration.evaluate()?;
             evaluated.update_photos();

@@ -52,7 +52,7 @@ impl Adjustment {
     }
 
     /// Whether the variance components are kept, not estimated: they are once a zone creeps.
-    pub fn keeps_components(&self) -> bool {
+    fn keeps_components(&self) -> bool {
         self.prior.zones > 0
     }
 
