@@ -241,8 +241,8 @@ mod tests {
         assert!(unknown.text.ends_with("not known here"), "{}", unknown.text);
     }
 
-    /// Points of surveys, and the peak memory of their runs, MB: dam_small, fountain, and a sixteenth, a quarter and the
-    /// whole of a dam.
+    /// Points of surveys, and the peak memory of their runs, MB: dam_small, fountain, and a sixteenth, a quarter and
+    /// the whole of a dam.
     const MEASURED: [(u64, u64); 5] = [
         (1_280_000, 238),
         (5_200_000, 466),

@@ -122,8 +122,8 @@ impl Adjustment {
         self.wrong_rate * self.stones[i].info.hidden.powi(2)
     }
 
-    /// Probability beforehand that a stone does not seem to move with the field: it is loose, or its clouds show it at a
-    /// wrong place.
+    /// Probability beforehand that a stone does not seem to move with the field: it is loose, or its clouds show it
+    /// at a wrong place.
     pub fn leaving_share(&self, i: usize) -> f64 {
         (self.prior.loose.share + self.wrong_share(i)).min(1.0)
     }

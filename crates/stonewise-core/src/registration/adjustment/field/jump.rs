@@ -38,7 +38,8 @@ pub(crate) fn test_jumps(problem: &FieldProblem, sides: &[Vec<bool>]) -> Option<
     )
 }
 
-/// `of_stone`: information of each stone on the field unknowns, and what is left of its vector; `ways`: at most [`WAYS`].
+/// `of_stone`: information of each stone on the field unknowns, and what is left of its vector; `ways`: at most
+/// [`WAYS`].
 fn test_ways(factor: &BlockFactor<9>, of_stone: &[(Matrix9, Vector9)], ways: &[Vec<bool>]) -> Vec<Jump> {
     let columns = of_stone.iter().enumerate().map(|(i, (m, _))| {
         let mut columns = SMatrix::<f64, 9, { 3 * WAYS }>::zeros();
