@@ -20,8 +20,8 @@ use stonewise_segment::{Detector, StoneFinder, Weights};
 /// Disk that a point needs while a run works: tiles, labels, pairs of stones, the labelled cloud. Measured on
 /// surveys of 1 to 200 million points (docs/src/performance.md), rounded up.
 const DISK_PER_POINT: u64 = 90;
-/// Memory at rest, for each of the first ten million points, most of it for photos, and for each other point: 238 MB at
-/// 1.3 million points, 466 MB at 5.2 million, 0.9 GB at 27 million, 1.1 GB at 105 million, 4.2 GB at 332 million.
+/// Memory at rest, for each of the first ten million points, most of it for photos, and for each other point: 238 MB
+/// at 1.3 million points, 466 MB at 5.2 million, 0.9 GB at 27 million, 1.2 GB at 105 million, 4.2 GB at 332 million.
 const MEMORY_BASE: u64 = 200 << 20;
 const FIRST_POINTS: u64 = 10_000_000;
 const MEMORY_PER_FIRST_POINT: u64 = 52;

@@ -19,7 +19,7 @@ pub(super) struct Run<'a, S> {
     /// Solution of the last iteration.
     last: Option<Solution>,
     iterations: usize,
-    /// Most iterations; each crack or zone that is found adds as many again.
+    /// Most iterations; after each crack or zone that is found, as many again are allowed.
     allowed: usize,
 }
 

@@ -20,7 +20,7 @@ const LEAST: f64 = 5.0;
 
 /// How often the clouds are wrong, from the squared hidden share of each stone and the probability that they are
 /// wrong about it: one step of expectation maximisation (Dempster, Laird & Rubin 1977). At most one: stones of which
-/// little is hidden leave their neighbours for other reasons, too.
+/// little is hidden may depart from their neighbours for other reasons as well.
 pub(super) fn estimated_rate(stones: impl Iterator<Item = (f64, f64)>) -> f64 {
     let (hidden, wrong) = stones.fold((0.0, 0.0), |sum, stone| (sum.0 + stone.0, sum.1 + stone.1));
     ((STONES_EXPECTED * EXPECTED + wrong) / (STONES_EXPECTED + hidden)).min(1.0)

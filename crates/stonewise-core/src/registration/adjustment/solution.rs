@@ -51,7 +51,7 @@ impl Adjustment {
         }
     }
 
-    /// Whether the variance components are kept, not estimated: they are once a zone creeps.
+    /// Whether the variance components are kept instead of estimated: once a creeping zone has been found.
     fn keeps_components(&self) -> bool {
         self.prior.zones > 0
     }
@@ -156,10 +156,10 @@ impl Adjustment {
         Some(field)
     }
 
-    /// Whether a field and the probabilities of the stones are numbers.
+    /// Whether the displacements of a field and the probabilities of the stones are finite.
     pub fn is_finite(&self, field: &Field) -> bool {
-        let moves = |state: &FieldVector| state.displacement().iter().all(|x| x.is_finite());
-        field.state.iter().all(moves) && self.stones.iter().all(|stone| stone.p_with_field.is_finite())
+        let is_finite = |state: &FieldVector| state.displacement().iter().all(|x| x.is_finite());
+        field.state.iter().all(is_finite) && self.stones.iter().all(|stone| stone.p_with_field.is_finite())
     }
 
     /// Parts the wall along its most significant crack; whether there is one.
@@ -369,10 +369,12 @@ mod tests {
         adjustment.wrong_rate = 1.0;
         for (stone, hidden) in [(20, 0.99), (21, 1.0)] {
             adjustment.stones[stone].info.hidden = hidden;
-            assert!(adjustment.leaving_share(stone) <= 1.0);
+            assert_eq!(adjustment.leaving_share(stone), 0.5);
         }
         let solution = solved(&mut adjustment, &points);
         assert!(adjustment.is_finite(&solution.field));
+        // Their points show that they move with the field.
+        assert!((20..=21).all(|i| adjustment.stones[i].p_with_field > 0.5));
         adjustment.stones[20].p_with_field = f64::NAN;
         assert!(!adjustment.is_finite(&solution.field));
     }

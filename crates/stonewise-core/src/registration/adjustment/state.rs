@@ -13,6 +13,9 @@ use crate::geometry::SmallMotion;
 use crate::statistics::component_median;
 use nalgebra::Vector3;
 
+/// Largest prior probability that a stone appears not to move with the field: its observations decide.
+const MOST_LEAVING: f64 = 0.5;
+
 /// All stones, what is assumed of their motions, and the models under which they are observed.
 pub(crate) struct Adjustment {
     /// In the order of the source; one per node of the prior's graph.
@@ -122,10 +125,10 @@ impl Adjustment {
         self.wrong_rate * self.stones[i].info.hidden.powi(2)
     }
 
-    /// Probability beforehand that a stone does not seem to move with the field: it is loose, or its clouds show it
-    /// at a wrong place.
+    /// Prior probability that a stone appears not to move with the field: it is loose, or its clouds show it at a
+    /// wrong place. At most one half.
     pub fn leaving_share(&self, i: usize) -> f64 {
-        (self.prior.loose.share + self.wrong_share(i)).min(1.0)
+        (self.prior.loose.share + self.wrong_share(i)).min(MOST_LEAVING)
     }
 }
 

@@ -106,7 +106,7 @@ const SAME_PLACE_M: f64 = 0.005;
 const LIKELIER: f64 = 3.3;
 
 impl Track {
-    /// The track of a stone that was sought from several places, `own` being the most probable one beforehand: the
+    /// The track of a stone that was sought from several places; `own`: from the most probable one beforehand. The
     /// first that was found, unless its photos are clearly more alike at another. None counts where they are more
     /// alike at another place, but not clearly.
     pub fn best_of(own: Self, others: impl IntoIterator<Item = Self>) -> Self {

@@ -23,7 +23,7 @@ const WAYS: usize = 3;
 ///
 /// The jump is three more unknowns of the adjustment: with P the matrix of the field and Q the jump's
 /// columns, its information is R - Q' P^-1 Q, and P need not be factored again. Cost: one solve for every
-/// [`WAYS`] ways, with three right-hand sides each. `None` where the equations cannot be factored.
+/// [`WAYS`] ways, with three right-hand sides for each way. `None` where the equations cannot be factored.
 pub(crate) fn test_jumps(problem: &FieldProblem, sides: &[Vec<bool>]) -> Option<Vec<Jump>> {
     let normal = normal_equations(problem)?;
     let stones = normal.of_stones.iter().zip(&normal.state);
@@ -38,7 +38,7 @@ pub(crate) fn test_jumps(problem: &FieldProblem, sides: &[Vec<bool>]) -> Option<
     )
 }
 
-/// `of_stone`: information of each stone on the field unknowns, and what is left of its vector; `ways`: at most
+/// `of_stone`: information of each stone on the field unknowns, and the residual of its vector; `ways`: at most
 /// [`WAYS`].
 fn test_ways(factor: &BlockFactor<9>, of_stone: &[(Matrix9, Vector9)], ways: &[Vec<bool>]) -> Vec<Jump> {
     let columns = of_stone.iter().enumerate().map(|(i, (m, _))| {
@@ -66,7 +66,7 @@ fn test_ways(factor: &BlockFactor<9>, of_stone: &[(Matrix9, Vector9)], ways: &[V
 }
 
 impl Jump {
-    /// The jump that these equations determine; none where they do not.
+    /// The jump that these equations determine; zero where they determine none.
     fn of(information: &Matrix3<f64>, vector: &Vector3<f64>) -> Self {
         let information = 0.5 * (information + information.transpose());
         match information.cholesky() {
@@ -153,8 +153,8 @@ mod tests {
             .collect();
         assert!(sides.len() > WAYS && !sides.len().is_multiple_of(WAYS));
         let found = test_jumps(&problem, &sides).unwrap();
-        let nobody = test_jumps(&problem, &[vec![false; 12]]).unwrap()[0];
-        assert_eq!((nobody.jump, nobody.excess), (Vector3::zeros(), 0.0));
+        let unmoved = test_jumps(&problem, &[vec![false; 12]]).unwrap()[0];
+        assert_eq!((unmoved.jump, unmoved.excess), (Vector3::zeros(), 0.0));
         let mut matrix = prior(&wall.graph, &problem.components, &problem.ties, &problem.least);
         let of_stone: Vec<(Matrix9, Vector9)> = eliminate_own_motions(&problem, &problem.own_variances())
             .iter()

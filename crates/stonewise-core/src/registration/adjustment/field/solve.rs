@@ -52,7 +52,7 @@ pub(crate) fn information(problem: &FieldProblem) -> (BlockMatrix<9>, Vec<Matrix
     (matrix, of_stones.into_iter().map(|s| s.0).collect())
 }
 
-/// What the stones say of the field's unknowns: information and vector.
+/// The stones' equations of the field's unknowns: information and vector.
 fn of_stones(problem: &FieldProblem, eliminated: &[Eliminated]) -> Vec<(Matrix9, Vector9)> {
     let of_stone = |(i, stone): (usize, &Eliminated)| {
         let a = stone_from_field(&problem.graph.nodes[i].face_from_world);

@@ -139,7 +139,7 @@ struct PoseEquations {
     right: DVector<f64>,
 }
 
-/// What is left of the sights of a stone.
+/// Residuals of the sights of a stone, summed.
 #[derive(Clone, Copy, Default)]
 struct Misfit {
     /// Sum of the weighted squares of the residuals.
@@ -382,8 +382,8 @@ impl PoseProblem<'_> {
         found
     }
 
-    /// Weighs a stone's sights, and what its clouds say, anew by their residuals; the misfit with the former weights.
-    /// `prior`: information of the clouds.
+    /// Updates the weights of a stone's sights and of its clouds from their residuals; returns the misfit with the
+    /// former weights. `prior`: information of the clouds.
     fn reweight(
         &self,
         stone: &PoseStone,
@@ -475,7 +475,7 @@ impl PoseProblem<'_> {
         Some((factor.solve(&normal.right), factor.inverse()))
     }
 
-    /// Adds what a stone says of the poses, its own unknowns eliminated; `prior`: information of its clouds.
+    /// Adds a stone's equations of the poses, its own unknowns eliminated; `prior`: information of its clouds.
     fn add_stone(
         &self,
         equations: &mut PoseEquations,
@@ -542,7 +542,7 @@ impl PoseProblem<'_> {
                 }
             }
             for pulled in patches {
-                // A list is read faster than a tree.
+                // Iterating over a list is faster than over a tree.
                 let pulled: Vec<(usize, Vector3<f64>)> = pulled.into_iter().collect();
                 for (column, of_column) in &pulled {
                     for (row, of_row) in &pulled {

@@ -24,7 +24,7 @@ impl PatchFit {
         Self::of(grid, grid.observed(epochs, noise), noise)
     }
 
-    /// The posterior mean of the surface, from what the points say of its coefficients.
+    /// The posterior mean of the surface, from the normal equations of its points.
     pub fn of(grid: PatchGrid, observed: Observed, noise: &SurfaceNoise) -> Option<Self> {
         let Observed {
             mut matrix,

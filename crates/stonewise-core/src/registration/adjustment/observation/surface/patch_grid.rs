@@ -139,7 +139,7 @@ impl PatchGrid {
         }
     }
 
-    /// What the points of both epochs say of the coefficients.
+    /// Normal equations of the coefficients by the points of both epochs, without the prior.
     pub fn observed(&self, epochs: [&[WeightedPoint]; 2], noise: &SurfaceNoise) -> Observed {
         let [short, _] = self.counts();
         let mut matrix = Band::zeros(self.coefficient_count(), 3 * short + 3);

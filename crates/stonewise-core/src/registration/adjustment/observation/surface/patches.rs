@@ -38,7 +38,7 @@ impl PatchPoints {
         [first, second]
     }
 
-    /// What they say of the patch's coefficients, with these weights.
+    /// Normal equations of the patch's coefficients by these points, with their weights.
     pub fn observed(&self, noise: &SurfaceNoise) -> Observed {
         self.grid.observed(self.points(), noise)
     }
