@@ -1,9 +1,7 @@
 //! Common jumps of the motion between two sides of the wall.
 
 use super::problem::FieldProblem;
-use super::solve::normal_equations;
-use crate::linalg::BlockFactor;
-use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
+use super::solve::{Normal, normal_equations};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use rayon::prelude::*;
 
@@ -27,21 +25,20 @@ const WAYS: usize = 3;
 pub(crate) fn test_jumps(problem: &FieldProblem, sides: &[Vec<bool>]) -> Option<Vec<Jump>> {
     let normal = normal_equations(problem)?;
     let stones = normal.of_stones.iter().zip(&normal.state);
-    let of_stone: Vec<(Matrix9, Vector9)> = stones
-        .map(|((information, vector), state)| (*information, vector - information * state))
+    let left: Vec<Vector3<f64>> = stones
+        .map(|((m, v), state)| (v - m * state).fixed_rows::<3>(0).into_owned())
         .collect();
     Some(
         sides
             .par_chunks(WAYS)
-            .flat_map_iter(|ways| test_ways(&normal.factor, &of_stone, ways))
+            .flat_map_iter(|ways| test_ways(&normal, &left, ways))
             .collect(),
     )
 }
 
-/// `of_stone`: information of each stone on the field unknowns, and the residual of its vector; `ways`: at most
-/// [`WAYS`].
-fn test_ways(factor: &BlockFactor<9>, of_stone: &[(Matrix9, Vector9)], ways: &[Vec<bool>]) -> Vec<Jump> {
-    let columns = of_stone.iter().enumerate().map(|(i, (m, _))| {
+/// `left`: residual of each stone's equations of the field's displacement; `ways`: at most [`WAYS`].
+fn test_ways(normal: &Normal, left: &[Vector3<f64>], ways: &[Vec<bool>]) -> Vec<Jump> {
+    let columns = normal.of_stones.iter().enumerate().map(|(i, (m, _))| {
         let mut columns = SMatrix::<f64, 9, { 3 * WAYS }>::zeros();
         for (way, _) in ways.iter().enumerate().filter(|(_, side)| side[i]) {
             columns
@@ -50,14 +47,14 @@ fn test_ways(factor: &BlockFactor<9>, of_stone: &[(Matrix9, Vector9)], ways: &[V
         }
         columns
     });
-    let solved = factor.solve(&columns.collect::<Vec<_>>());
+    let solved = normal.factor.solve(&columns.collect::<Vec<_>>());
     let jump = |(way, side): (usize, &Vec<bool>)| {
         let mut information = Matrix3::zeros();
         let mut vector = Vector3::zeros();
         for i in (0..side.len()).filter(|&i| side[i]) {
-            let (m, v) = &of_stone[i];
+            let (m, _) = &normal.of_stones[i];
             information += m.fixed_view::<3, 3>(0, 0);
-            vector += v.fixed_rows::<3>(0);
+            vector += left[i];
             information -= m.fixed_rows::<3>(0) * solved[i].fixed_columns::<3>(3 * way);
         }
         Jump::of(&information, &vector)
@@ -93,6 +90,7 @@ mod tests {
     use crate::registration::adjustment::field::field_vector::stone_from_field;
     use crate::registration::adjustment::field::prior::prior;
     use crate::registration::adjustment::field::testing::SmallWall;
+    use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
     use nalgebra::{DMatrix, DVector};
 
     /// A jump and its excess, from the whole matrix with three more unknowns, densely.
