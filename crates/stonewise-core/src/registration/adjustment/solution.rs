@@ -255,7 +255,7 @@ impl Adjustment {
             stone.doubt = doubt;
         }
         let decided = || self.stones.iter().filter(|s| s.evidence == Evidence::Decides);
-        let wrong = |s: &StoneState| (s.info.hidden.powi(2), s.p_wrong());
+        let wrong = |s: &StoneState| (s.info.hidden, s.p_wrong());
         self.wrong_rate = estimated_rate(decided().map(wrong));
         self.prior.loose.share = estimated_share(self.params.loose_share, decided().map(|s| self.p_loose(s)));
     }
