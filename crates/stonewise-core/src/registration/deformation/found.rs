@@ -92,6 +92,8 @@ pub enum ZoneKind {
     Heave,
     /// It moved along the wall.
     Slide,
+    /// Its stones moved in opposite directions.
+    Distortion,
 }
 
 impl ZoneKind {
@@ -104,6 +106,7 @@ impl ZoneKind {
             Self::Settlement => "settlement",
             Self::Heave => "heave",
             Self::Slide => "slide",
+            Self::Distortion => "distortion",
         }
     }
 }

@@ -336,6 +336,32 @@ fn the_larger_part_is_the_one_that_kept_its_shape() {
 }
 
 #[test]
+fn a_zone_whose_stones_rose_and_sank_is_distorted() {
+    let noise = errors(8);
+    let moved = |k: usize| match k % COLUMNS {
+        3 | 4 => Vector3::new(0.0, 0.0, 0.003),
+        5 | 6 => Vector3::new(0.0, 0.0, -0.003),
+        _ => Vector3::zeros(),
+    };
+    let found = found(&wall(moved, |k| noise[k]));
+    let kinds: Vec<ZoneKind> = found.zones.iter().map(|zone| zone.kind).collect();
+    assert_eq!(kinds, [ZoneKind::Distortion], "{:?}", found.zones);
+}
+
+#[test]
+fn a_zone_that_sank_unevenly_settled() {
+    let noise = errors(8);
+    let moved = |k: usize| match k % COLUMNS {
+        3 if k < 2 * COLUMNS => Vector3::new(0.0, 0.0, -0.02),
+        3 | 4 => Vector3::new(0.0, 0.0, -0.001),
+        _ => Vector3::zeros(),
+    };
+    let found = found(&wall(moved, |k| noise[k]));
+    let kinds: Vec<ZoneKind> = found.zones.iter().map(|zone| zone.kind).collect();
+    assert_eq!(kinds, [ZoneKind::Settlement], "{:?}", found.zones);
+}
+
+#[test]
 fn what_lies_beyond_a_crack_has_moved_against_the_larger_part() {
     let errors = errors(5);
     let is_beyond = |k: usize| k % COLUMNS >= 6;

@@ -20,6 +20,9 @@ const TILTED: f64 = 0.8;
 /// Least standard deviation of the motion across a tilted zone, as a share of its mean: half of what a tilt about one
 /// side has.
 const UNEVEN: f64 = 0.3;
+/// Least mean of a zone's motions, as a share of the mean of their sizes, for the zone to have moved in one direction:
+/// three quarters of the motion has one sign.
+const ONE_WAY: f64 = 0.5;
 /// Fewest stones that show a tilt.
 const TILT_STONES: usize = 6;
 /// Cosine of the angle to the vertical above which a face lies level, as on a step or a crest.
@@ -135,14 +138,19 @@ fn in_wall(body: &Body, stones: &[usize], in_face: &[Vector3<f64>]) -> Vec<Vecto
     stones.iter().zip(in_face).map(of_stone).collect()
 }
 
-/// What the motions of a zone (along, up, out) resemble: by their largest mean component, and across the wall by
-/// whether they grow towards one side.
+/// What the motions of a zone (along, up, out) resemble: by the component that is largest in the quadratic mean and its
+/// sign, and across the wall by whether they grow towards one side.
 fn kind(body: &Body, stones: &[usize], in_face: &[Vector3<f64>], mean: &Vector3<f64>) -> ZoneKind {
-    match mean.iamax() {
+    let squares: Vector3<f64> = in_face.iter().map(|d| d.component_mul(d)).sum();
+    let largest = squares.imax();
+    let mean_size = in_face.iter().map(|d| d[largest].abs()).sum::<f64>() / stones.len() as f64;
+    let is_one_way = mean[largest].abs() >= ONE_WAY * mean_size;
+    match largest {
+        2 if is_tilt(body, stones, in_face) => ZoneKind::Tilt,
+        _ if !is_one_way => ZoneKind::Distortion,
         0 => ZoneKind::Slide,
         1 if mean.y < 0.0 => ZoneKind::Settlement,
         1 => ZoneKind::Heave,
-        _ if is_tilt(body, stones, in_face) => ZoneKind::Tilt,
         _ if mean.z > 0.0 => ZoneKind::Bulge,
         _ => ZoneKind::Dent,
     }

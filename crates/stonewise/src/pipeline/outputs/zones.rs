@@ -98,7 +98,7 @@ fn write_zones(run: &Run) -> Result<()> {
     table.push(
         "kind",
         "",
-        "what it resembles: bulge, dent, tilt, settlement, heave or slide",
+        "what it resembles: bulge, dent, tilt, settlement, heave, slide or distortion",
         kinds,
     )?;
 
