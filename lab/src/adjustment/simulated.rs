@@ -7,6 +7,7 @@ use crate::survey::{Places, mean};
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use stonewise_core::evaluate::MotionField;
+use stonewise_core::progress::Silent;
 use stonewise_simulate::{
     Scan, SceneParams, SeenCells, TlsParams, UavParams, WallMotion, WallParams, World, stone_truths,
 };
@@ -21,7 +22,7 @@ pub fn build(case: Case, sensor: &str, seed: u64, options: &Options) -> Trial {
         scans.tls.or(scans.uav).unwrap()
     };
     let first = scan(0);
-    let truths = stone_truths(&world);
+    let truths = stone_truths(&world, &Silent).unwrap();
     let shares = |scan: &Scan, epoch: usize| {
         let mut cells = SeenCells::new(&world, epoch);
         cells.add(scan);

@@ -70,16 +70,6 @@ impl CocoFile {
     }
 }
 
-/// Writes the masks of these photos as a [`CocoFile`].
-///
-/// # Errors
-/// The file cannot be written.
-pub fn write_coco(path: &Path, photos: &[CocoPhoto<'_>]) -> Result<(), MaskError> {
-    let mut file = CocoFile::default();
-    photos.iter().for_each(|photo| file.add(photo));
-    file.write(path)
-}
-
 fn annotation(labels: &LabelImage, label: u32, rings: &[Ring]) -> Value {
     let area: f64 = rings.iter().map(|ring| ring_area(ring)).sum();
     let vertices = || rings.iter().flatten();

@@ -9,7 +9,7 @@ mod mask_source;
 mod valid_regions;
 
 pub use coco::{CocoMasks, ListedPhoto};
-pub use coco_write::{CocoFile, CocoPhoto, write_coco};
+pub use coco_write::{CocoFile, CocoPhoto};
 pub use error::MaskError;
 pub use label_png::{LabelFolder, read_label_png, write_label_png};
 pub use labelled_photo::{InstanceInfo, LabelledPhoto};

@@ -4,8 +4,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use stonewise_core::raster::{LabelImage, Raster};
 use stonewise_io::masks::{
-    CocoPhoto, InstanceInfo, LabelledPhoto, MaskError, MaskSource, read_label_png, write_coco,
-    write_label_png,
+    CocoFile, CocoPhoto, InstanceInfo, LabelledPhoto, MaskError, MaskSource, read_label_png, write_label_png,
 };
 
 /// A rectangle as a polygon.
@@ -201,7 +200,11 @@ fn written_coco_reads_back_to_the_same_pixels() {
         labels: &labels,
         instances: &known,
     };
-    write_coco(&path, &[photo("epoch1/a.jpg"), photo("epoch2/a.jpg")]).unwrap();
+    let mut file = CocoFile::default();
+    for name in ["epoch1/a.jpg", "epoch2/a.jpg"] {
+        file.add(&photo(name));
+    }
+    file.write(&path).unwrap();
     let source = MaskSource::open(&path).unwrap();
     let read = source.labels_for("epoch2/a.jpg", 8, 6).unwrap().unwrap();
     let renumbered: Vec<u32> = read.labels.data().iter().map(|l| l * 100).collect();

@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use stonewise_core::raster::{Raster, RgbImage};
 use stonewise_io::image_io::write_png_rgb;
-use stonewise_io::masks::{CocoPhoto, write_coco};
+use stonewise_io::masks::{CocoFile, CocoPhoto};
 use tempfile::TempDir;
 
 /// Stones of 16 x 16 pixels with joints of 4, `columns` a row.
@@ -92,7 +92,11 @@ fn folder() -> (TempDir, PathBuf) {
         instances: &[],
     };
     let masks = dir.path().join("masks.json");
-    write_coco(&masks, &[photo("a.png"), photo("b.png")]).unwrap();
+    let mut file = CocoFile::default();
+    for name in ["a.png", "b.png"] {
+        file.add(&photo(name));
+    }
+    file.write(&masks).unwrap();
     (dir, masks)
 }
 

@@ -17,7 +17,9 @@ impl Survey<'_> {
     pub fn scanned(&self, truths: &mut Option<Vec<StoneTruth>>) -> Result<SeenByScans, SimulateError> {
         let part = format!("epoch{}_clouds.json", self.number());
         if let Some(seen) = self.unfinished.read(&part) {
-            truths.get_or_insert_with(|| stone_truths(self.world));
+            if truths.is_none() {
+                *truths = Some(stone_truths(self.world, self.progress)?);
+            }
             return Ok(seen);
         }
         create_folder(&self.folder.join(format!("epoch{}", self.number())))?;

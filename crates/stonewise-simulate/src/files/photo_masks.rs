@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use stonewise_core::geometry::View;
 use stonewise_core::raster::LabelImage;
-use stonewise_io::masks::{CocoPhoto, InstanceInfo, write_coco, write_label_png};
+use stonewise_io::masks::{CocoFile, CocoPhoto, InstanceInfo, write_label_png};
 use stonewise_io::table::{Table, write_csv};
 
 /// What the table of masks as a whole holds.
@@ -106,44 +106,32 @@ impl<'a> MaskWriter<'a> {
         }
 
         self.kept.sort_by(|a, b| a.0.cmp(&b.0));
-        let (names, labels): (Vec<String>, Vec<LabelImage>) = self.kept.into_iter().unzip();
-        let known: Vec<Vec<InstanceInfo>> = labels.iter().map(true_instances).collect();
-        write_coco(
-            &truth.join(format!("epoch{number}_coco.json")),
-            &coco_photos(&names, &labels, &known),
-        )?;
-        let shuffled: Vec<LabelImage> = labels
-            .iter()
-            .zip(self.seed..)
-            .map(|(l, s)| shuffle(l, s).0)
-            .collect();
+        let (mut of_stones, mut of_project) = (CocoFile::default(), CocoFile::default());
+        let words = format!("masks of epoch {number}");
+        let photos = self.kept.iter().enumerate();
+        self.survey
+            .progress
+            .each(&words, photos, |(i, (file_name, labels))| {
+                of_stones.add(&CocoPhoto {
+                    file_name,
+                    labels,
+                    instances: &true_instances(labels),
+                });
+                let (shuffled, _) = shuffle(labels, self.seed.wrapping_add(i as u64));
+                of_project.add(&CocoPhoto {
+                    file_name,
+                    labels: &shuffled,
+                    instances: &[],
+                });
+                Ok::<(), SimulateError>(())
+            })?;
+
+        of_stones.write(&truth.join(format!("epoch{number}_coco.json")))?;
         let masks = self.survey.folder.join("masks");
         create_folder(&masks)?;
-
-        let unknown = vec![Vec::new(); shuffled.len()];
-        write_coco(
-            &masks.join(format!("epoch{number}.json")),
-            &coco_photos(&names, &shuffled, &unknown),
-        )?;
+        of_project.write(&masks.join(format!("epoch{number}.json")))?;
         Ok(())
     }
-}
-
-fn coco_photos<'a>(
-    names: &'a [String],
-    labels: &'a [LabelImage],
-    instances: &'a [Vec<InstanceInfo>],
-) -> Vec<CocoPhoto<'a>> {
-    names
-        .iter()
-        .zip(labels)
-        .zip(instances)
-        .map(|((file_name, labels), instances)| CocoPhoto {
-            file_name,
-            labels,
-            instances,
-        })
-        .collect()
 }
 
 fn present(labels: &LabelImage) -> Vec<u32> {

@@ -11,6 +11,7 @@ use nalgebra::{Point3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 use stonewise_core::geometry::Rigid3;
 use stonewise_core::id::StoneId;
+use stonewise_core::progress::{Interrupted, Progress};
 use stonewise_core::raster::LabelImage;
 
 /// A stone with its true motion.
@@ -48,16 +49,20 @@ const CELL_M: f64 = 0.025;
 const STEP_M: f64 = 0.006;
 
 /// The truth of all stones, in the wall's order, a piece of the section at a time.
-pub fn stone_truths(world: &World) -> Vec<StoneTruth> {
+///
+/// # Errors
+/// The caller stopped the work.
+pub fn stone_truths(world: &World, progress: &dyn Progress) -> Result<Vec<StoneTruth>, Interrupted> {
     let extent = world.wall.extent();
     let mut truths = Vec::with_capacity(world.wall.stones.len());
     let mut sampled = SampledFaces::default();
-    for window in Window::cover(extent) {
+    progress.each("truth of all stones", Window::cover(extent), |window| {
         let surface = world.next_surface(window.surroundings(extent), &mut sampled);
         truths.extend(window_truths(world, &world.scene_of(&surface, 0), &window));
-    }
+        Ok::<(), Interrupted>(())
+    })?;
     truths.sort_by_key(|t| t.id);
-    truths
+    Ok(truths)
 }
 
 /// The truth of the stones whose middle lies in a piece of the section; `scene`: of its
