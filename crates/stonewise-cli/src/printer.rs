@@ -9,8 +9,8 @@ use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
 use std::time::Instant;
 use stonewise_core::progress::Progress;
 
-/// Seconds until a step of a log that is not a terminal says again where it stands; doubled each time, so
-/// that a step of a second and one of a day both leave a few lines.
+/// Seconds until the next line about the same work in a log that is not a terminal; doubled each time, so that a step
+/// of a second and one of a day both leave a few lines.
 const FIRST_WAIT_S: f64 = 5.0;
 /// The longest such wait: within it a reader of the log sees that the run is alive.
 const LONGEST_WAIT_S: f64 = 600.0;
@@ -32,7 +32,7 @@ struct Shown {
     screen: Option<Screen>,
     /// The last line of progress where it is not: work that begins anew many times is one line.
     last: String,
-    /// When the step may say again where it stands, seconds.
+    /// Earliest time of the next line about the same work, seconds.
     next: f64,
     wait: f64,
 }
@@ -165,28 +165,40 @@ impl Shown {
                     None => screen.part(&words, "", self.part.total, self.part.done),
                 }
             }
-            (None, Some(place)) if now >= self.next => {
-                self.wait = (2.0 * self.wait).min(LONGEST_WAIT_S);
-                self.next = now + self.wait;
-                let count = match self.part.total {
-                    0 => self.part.what.clone(),
-                    total => format!("{}: {} of {total}", self.part.what, self.part.done),
-                };
-                let words = [count.as_str(), self.part.detail.as_str()];
-                self.say(&joined(Some(place.trim_start()), &words), now);
-            }
-            (None, Some(_)) => {}
+            (None, Some(place)) => self.say_where(Some(place.trim_start()), now),
             // A small part of a step whose files were there.
             (None, None) if self.steps.is_within() => {}
-            (None, None) => self.say(&self.part.what.clone(), now),
+            (None, None) if self.part.detail.is_empty() => {
+                if self.say(&self.part.what.clone(), now) {
+                    (self.wait, self.next) = (FIRST_WAIT_S, now + FIRST_WAIT_S);
+                }
+            }
+            (None, None) => self.say_where(None, now),
         }
     }
 
-    /// A line of progress that differs from the last.
-    fn say(&mut self, line: &str, now: f64) {
-        if std::mem::replace(&mut self.last, line.to_owned()) != line {
+    /// A line with the count and the detail of the work, once the wait is over.
+    fn say_where(&mut self, step: Option<&str>, now: f64) {
+        if now < self.next {
+            return;
+        }
+        self.wait = (2.0 * self.wait).min(LONGEST_WAIT_S);
+        self.next = now + self.wait;
+        let count = match self.part.total {
+            0 => self.part.what.clone(),
+            total => format!("{}: {} of {total}", self.part.what, self.part.done),
+        };
+        let words = [count.as_str(), self.part.detail.as_str()];
+        self.say(&joined(step, &words), now);
+    }
+
+    /// A line of progress, unless it is the same as the last. Returns whether it differs.
+    fn say(&mut self, line: &str, now: f64) -> bool {
+        let differs = std::mem::replace(&mut self.last, line.to_owned()) != line;
+        if differs {
             note(&format!("[{now:.1} s] {line}"));
         }
+        differs
     }
 }
 
@@ -208,6 +220,9 @@ impl Progress for Printer {
             total,
             ..Part::default()
         };
+        if let Some(screen) = &shown.screen {
+            screen.restart();
+        }
         shown.show(self.now());
     }
 
@@ -258,9 +273,7 @@ impl Progress for Printer {
         }
         let mut shown = self.shown();
         unit.clone_into(&mut shown.part.detail);
-        if shown.steps.present().is_some() || shown.screen.is_some() {
-            shown.show(self.now());
-        }
+        shown.show(self.now());
     }
 
     fn note(&self, line: &str) {

@@ -64,15 +64,18 @@ impl Screen {
         if let Ok(mut shown) = self.then.lock() {
             *shown = then;
         }
+        self.restart();
         self.part(step, "", 0, 0);
+    }
+
+    /// The time to go is that of the work that begins now.
+    pub fn restart(&self) {
+        self.bar.reset();
     }
 
     /// A part of the work begins, named on a line of its own, of which `done` of `total` units are done; a
     /// total of 0 where it is unknown.
     pub fn part(&self, step: &str, words: &str, total: u64, done: u64) {
-        if done == 0 {
-            self.bar.reset();
-        }
         match total {
             0 => self.bar.unset_length(),
             total => self.bar.set_length(total),

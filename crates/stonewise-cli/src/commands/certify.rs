@@ -28,7 +28,11 @@ pub fn certify(args: &CertifyArgs, force: bool, printer: &Printer) -> Result<Out
     for figure in &certificate.figures {
         let answer = if figure.holds { "holds" } else { "FAILS" };
         let value = figure.value.map_or("-".to_owned(), |v| format!("{v:.4}"));
-        writeln!(out, "{answer} {value:>10}  {}", figure.name)?;
+        let note = match figure.note.as_str() {
+            "" => String::new(),
+            note => format!(" ({note})"),
+        };
+        writeln!(out, "{answer} {value:>10}  {}{note}", figure.name)?;
     }
     printer.log(&format!("open {}", args.out.join("certificate.html").display()));
     let outside = certificate.figures.iter().filter(|f| !f.holds).count();

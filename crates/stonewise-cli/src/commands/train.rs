@@ -7,7 +7,8 @@ use crate::printer::Printer;
 use anyhow::{Result, bail};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-use stonewise::{OutputFolder, Owner, read_toml};
+use stonewise::{Error, OutputFolder, Owner, read_toml};
+use stonewise_core::params::Params;
 use stonewise_segment::dataset::{LabelledPhotos, PhotoCrops};
 use stonewise_segment::model::MaskRcnnConfig;
 use stonewise_segment::train::{
@@ -32,7 +33,14 @@ struct Config {
 /// Trains, or goes on training, until the time is up.
 pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let config = match &args.config {
-        Some(path) => read_toml(path)?,
+        Some(path) => {
+            let config: Config = read_toml(path)?;
+            let named = |error| Error::Parameters(format!("{error}: {}", path.display()));
+            if let Some(training) = &config.training {
+                training.check().map_err(named)?;
+            }
+            config
+        }
         None => Config {
             model: MaskRcnnConfig::light(),
             training: None,

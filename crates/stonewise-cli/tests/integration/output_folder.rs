@@ -360,3 +360,15 @@ fn impossible_tiles_and_twin_epochs_are_wrong_usage() {
     assert!(code == 2 && log.contains("two epochs are named"), "{log}");
     assert!(!out.exists());
 }
+
+#[test]
+fn a_training_with_an_impossible_value_makes_no_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    let (config, out) = (dir.path().join("training.toml"), dir.path().join("trained"));
+    fs::write(&config, "[training]\nbatch = 0\n").unwrap();
+    let mut command = stonewise();
+    command.args(["train", "--rendered", "--config"]).arg(&config);
+    let (code, log) = outcome(command.arg("--out").arg(&out));
+    assert!(code == 2 && log.contains("training.toml"), "{code}: {log}");
+    assert!(!out.exists());
+}

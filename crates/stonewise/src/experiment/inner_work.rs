@@ -1,12 +1,15 @@
-//! Progress of an experiment: one unit a run, whatever the runs themselves report.
+//! Progress of an experiment: each run is one unit, and the work inside it is the detail. Of several runs at a time, the
+//! detail is what one of them began last.
 
 use stonewise_core::progress::Progress;
 
-/// Lets work be stopped, but says nothing.
-pub(super) struct Quiet<'a>(pub &'a dyn Progress);
+/// Reports the work inside one unit of an experiment as its detail.
+pub(super) struct InnerWork<'a>(pub &'a dyn Progress);
 
-impl Progress for Quiet<'_> {
-    fn begin(&self, _: &str, _: u64) {}
+impl Progress for InnerWork<'_> {
+    fn begin(&self, what: &str, _: u64) {
+        self.0.detail(what);
+    }
 
     fn advance(&self, _: u64) {}
 

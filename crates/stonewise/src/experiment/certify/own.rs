@@ -3,8 +3,8 @@
 use super::certificate::Figure;
 use crate::error::{Error, Result};
 use crate::experiment::halves::halves_of;
+use crate::experiment::inner_work::InnerWork;
 use crate::experiment::known_motion::paper_motions;
-use crate::experiment::quiet::Quiet;
 use crate::pipeline::{Context, Summary, Until, first_stones, run_in};
 use crate::project::Project;
 use crate::storage::store::StepStore;
@@ -33,14 +33,14 @@ pub(super) fn figures(
     store: &Arc<StepStore>,
     progress: &dyn Progress,
 ) -> Result<Vec<Figure>> {
-    let quiet = Quiet(progress);
+    let inner = InnerWork(progress);
     progress.begin("the survey's own scans", 3);
-    let halves = halves_of(project, project.epochs.reference(), seed, store, &quiet)?;
+    let halves = halves_of(project, project.epochs.reference(), seed, store, &inner)?;
 
     let run = |name: &str, motion: Option<MotionField>| -> Result<Summary> {
         let mut halves = halves.clone();
         halves.epochs[EpochId::at(1)].motion = motion;
-        let context = Context::with_store(&halves, &out.join("own").join(name), Arc::clone(store), &quiet)?;
+        let context = Context::with_store(&halves, &out.join("own").join(name), Arc::clone(store), &inner)?;
         let summary = run_in(&context, Until::Registered)?;
         progress.advance(1);
         Ok(summary)
@@ -69,7 +69,7 @@ pub(super) fn figures(
         &halves,
         &out.join("own/still"),
         Arc::clone(store),
-        &quiet,
+        &inner,
     )?)?;
 
     for (motion, least) in paper_motions(&stones)?.into_iter().zip(LEAST_FOUND) {

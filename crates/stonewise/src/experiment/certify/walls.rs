@@ -2,7 +2,7 @@
 
 use super::certificate::{CertifyOptions, Figure};
 use crate::error::{Error, Result};
-use crate::experiment::quiet::Quiet;
+use crate::experiment::inner_work::InnerWork;
 use crate::experiment::sensitivity::base;
 use crate::experiment::simulation::not_simulated;
 use crate::pipeline::{Context, Until, run_in};
@@ -148,18 +148,18 @@ fn measured(
     store: &Arc<StepStore>,
     progress: &dyn Progress,
 ) -> Result<Wall> {
-    let quiet = Quiet(progress);
+    let inner = InnerWork(progress);
     let is_still = number.is_multiple_of(2);
     let params = survey(seed.wrapping_mul(1000).wrapping_add(number), is_still);
     let key = Key::new("survey", &params, &[]);
     let (dir, _) = store.step("survey", key, &[], |dir| {
-        let written = write_survey(&dir.file("survey"), &params, &quiet);
+        let written = write_survey(&dir.file("survey"), &params, &inner);
         written.map(drop).map_err(not_simulated)
     })?;
     let survey = dir.file("survey");
     let project = Project::read(&survey.join("stonewise.toml"))?;
     let folder = out.join("walls").join((number + 1).to_string());
-    let context = Context::with_store(&project, &folder, Arc::clone(store), &quiet)?;
+    let context = Context::with_store(&project, &folder, Arc::clone(store), &inner)?;
     let summary = run_in(&context, Until::Registered)?;
     let truth = survey.join("truth/stones.csv");
     let evaluation = evaluate_truth(&folder, &truth, &project.settings.evaluate)?;

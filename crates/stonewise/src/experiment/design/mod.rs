@@ -12,8 +12,8 @@ mod table;
 use crate::error::{Error, Result};
 use crate::experiment::baseline::{InventoryStone, baseline};
 use crate::experiment::halves::halves_of;
+use crate::experiment::inner_work::InnerWork;
 use crate::experiment::predicted::{limits_mm, medians_mm, without_chance};
-use crate::experiment::quiet::Quiet;
 use crate::files::{write_readable_json, write_text};
 use crate::pipeline::{Context, Run, Until};
 use crate::project::Project;
@@ -47,11 +47,11 @@ const DESCRIPTION: &str = "One row per stone of the first epoch: what it is like
 /// What stops the registration of the two halves; no stone can be measured.
 pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress) -> Result<Design> {
     let store = Arc::new(StepStore::new(&out.join("work"), Keeps::Every)?);
-    let quiet = Quiet(progress);
+    let inner = InnerWork(progress);
     progress.begin("the survey and its repetition", 4);
-    let (baseline, inventory) = baseline(project, &out.join("baseline"), &store, &quiet)?;
+    let (baseline, inventory) = baseline(project, &out.join("baseline"), &store, &inner)?;
     progress.advance(1);
-    let mut repeated = halves_of(project, project.epochs.reference(), seed, &store, &quiet)?;
+    let mut repeated = halves_of(project, project.epochs.reference(), seed, &store, &inner)?;
     let later = EpochId::at(1);
 
     for epoch in repeated.epochs.iter_mut() {
@@ -63,7 +63,7 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
     progress.advance(1);
     let folder = out.join("repetition");
     let components = {
-        let context = Context::with_store(&repeated, &folder, Arc::clone(&store), &quiet)?;
+        let context = Context::with_store(&repeated, &folder, Arc::clone(&store), &inner)?;
         let registered = Run::new(&context, Until::Registered).registered(later)?;
         registered.epoch_errors.as_ref().and_then(|e| e.components)
     };
@@ -74,7 +74,7 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
         repeated.epochs[later].clouds = moved_clouds(&repeated.epochs[later], sizes, seed, &store)?;
     }
 
-    let context = Context::with_store(&repeated, &folder, store, &quiet)?;
+    let context = Context::with_store(&repeated, &folder, store, &inner)?;
     let run = Run::new(&context, Until::Registered);
     let (registered, measured) = (run.registered(later)?, run.measured(later)?);
     progress.advance(1);

@@ -15,8 +15,8 @@ pub use tables::{Detail, PaperTables, Segmented};
 
 use crate::error::{Error, Result};
 use crate::experiment::halves::halves_of;
+use crate::experiment::inner_work::InnerWork;
 use crate::experiment::known_motion::{KnownMotion, paper_motions};
-use crate::experiment::quiet::Quiet;
 use crate::pipeline::{Context, Until, first_stones, run_in};
 use crate::project::{Epoch, Project};
 use crate::results::ResultSet;
@@ -147,8 +147,8 @@ fn measure(
         project.part.clone_from(&survey.paper_part);
     }
     project.epochs[EpochId::at(1)].motion = Some(motion.field.clone());
-    let quiet = Quiet(progress);
-    let context = Context::with_store(&project, folder, Arc::clone(store), &quiet)?;
+    let inner = InnerWork(progress);
+    let context = Context::with_store(&project, folder, Arc::clone(store), &inner)?;
     match run_in(&context, Until::Compared) {
         Err(Error::NoMatch { .. }) => return Ok(None),
         outcome => outcome?,

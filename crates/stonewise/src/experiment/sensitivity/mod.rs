@@ -11,7 +11,7 @@ pub(super) use cases::base;
 pub use point::{SensitivityOptions, SensitivityPoint};
 
 use crate::error::{Error, Result};
-use crate::experiment::quiet::Quiet;
+use crate::experiment::inner_work::InnerWork;
 use crate::pipeline::{Context, Until, run_in};
 use crate::project::Project;
 use crate::settings::Estimator;
@@ -74,8 +74,8 @@ fn measure(
     store: &Arc<StepStore>,
     progress: &dyn Progress,
 ) -> Result<Vec<SensitivityPoint>> {
-    let quiet = Quiet(progress);
-    let inputs = inputs(variant, &base(options.size_m, seed), store, &quiet)?;
+    let inner = InnerWork(progress);
+    let inputs = inputs(variant, &base(options.size_m, seed), store, &inner)?;
     let methods: &[&str] = if options.with_paper {
         &["stonewise", "paper"]
     } else {
@@ -90,7 +90,7 @@ fn measure(
                 project.settings.registration.estimator = Estimator::Gicp;
             }
             let folder = out.join(format!("{}-{method}", scanner.to_lowercase()));
-            let context = Context::with_store(&project, &folder, Arc::clone(store), &quiet)?;
+            let context = Context::with_store(&project, &folder, Arc::clone(store), &inner)?;
             let score = match run_in(&context, Until::Registered) {
                 Ok(_) => {
                     let params = &project.settings.evaluate;

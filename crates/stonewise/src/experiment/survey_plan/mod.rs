@@ -12,8 +12,8 @@ mod squares;
 mod values;
 
 use crate::error::{Error, Result};
+use crate::experiment::inner_work::InnerWork;
 use crate::experiment::predicted::{limits_mm, medians_mm, without_chance};
-use crate::experiment::quiet::Quiet;
 use crate::experiment::simulation::not_simulated;
 use crate::files::{write_readable_json, write_text};
 use crate::pipeline::{Context, Run, Until};
@@ -85,16 +85,16 @@ fn survey(
     store: &Arc<StepStore>,
     progress: &dyn Progress,
 ) -> Result<(PlannedSurvey, Squares)> {
-    let quiet = Quiet(progress);
+    let inner = InnerWork(progress);
     let name = added.map_or("as_planned".to_owned(), |name| format!("with_{name}"));
     let params = simulation(plan, seed);
     let (dir, _) = store.step("survey", Key::new("survey", &params, &[]), &[], |dir| {
-        let written = write_survey(&dir.file("survey"), &params, &quiet);
+        let written = write_survey(&dir.file("survey"), &params, &inner);
         written.map(drop).map_err(not_simulated)
     })?;
     let project = project(plan, &dir.file("survey"))?;
     let folder = out.join(&name);
-    let context = Context::with_store(&project, &folder, Arc::clone(store), &quiet)?;
+    let context = Context::with_store(&project, &folder, Arc::clone(store), &inner)?;
     let (run, later) = (Run::new(&context, Until::Registered), EpochId::at(1));
     let (registered, measured) = (run.registered(later)?, run.measured(later)?);
     let deformation = registered.deformation.as_ref();

@@ -10,8 +10,8 @@ pub use tuned::{PointErrors, TuneOptions, Tuned, TunedPoint};
 
 use crate::error::{Error, Result};
 use crate::experiment::halves::halves_of;
+use crate::experiment::inner_work::InnerWork;
 use crate::experiment::known_motion::paper_motions;
-use crate::experiment::quiet::Quiet;
 use crate::experiment::settings_with::{count_changes, project_lines, settings_with};
 use crate::files::write_text;
 use crate::pipeline::{Context, Until, first_stones, run_in};
@@ -139,8 +139,8 @@ fn measure(
             ..case.clone()
         };
         let folder = out.join(name.join("_")).join(number.to_string());
-        let quiet = Quiet(progress);
-        let context = Context::with_store(&project, &folder, Arc::clone(store), &quiet)?;
+        let inner = InnerWork(progress);
+        let context = Context::with_store(&project, &folder, Arc::clone(store), &inner)?;
         let pair = match run_in(&context, Until::Registered) {
             Ok(summary) => summary.pairs.into_iter().next().unwrap_or_default(),
             Err(error @ (Error::NoMatch { .. } | Error::Survey(_) | Error::Registration(_))) => {

@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::epoch::Epochs;
-use stonewise_core::geometry::{Bounds, Plane, View, cell_of};
+use stonewise_core::geometry::{Bounds, Camera, Plane, View, cell_of};
 use stonewise_core::transfer::NoEffect;
 use stonewise_segment::Weights;
 
@@ -107,7 +107,7 @@ fn carry(
     };
     let mut rays = Vec::new();
     for pixel in edit.shape() {
-        match view.ray(*pixel).filter(|_| view.is_inside(*pixel)) {
+        match view.ray(*pixel).filter(|_| is_in_photo(&view.camera, *pixel)) {
             Some((centre, direction)) => rays.push(Ray::new(centre, direction)),
             None => return Ok(Err(nowhere(*pixel, "lies outside the photo"))),
         }
@@ -121,6 +121,11 @@ fn carry(
         }
     }
     Ok(Ok(places))
+}
+
+/// Whether a vertex was drawn in the photo or on its border.
+fn is_in_photo(camera: &Camera, [x, y]: [f64; 2]) -> bool {
+    (0.0..=f64::from(camera.width)).contains(&x) && (0.0..=f64::from(camera.height)).contains(&y)
 }
 
 fn nowhere(pixel: [f64; 2], what: &str) -> NoEffect {
@@ -225,4 +230,29 @@ fn gather(context: &Context, rays: &mut [Ray], labelled: &Labelled) -> Result<()
     }
 
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stonewise_core::geometry::Distortion;
+
+    #[test]
+    fn the_border_of_a_photo_belongs_to_it() {
+        let camera = Camera {
+            width: 40,
+            height: 30,
+            focal_px: [50.0; 2],
+            center_px: [20.0, 15.0],
+            skew_px: 0.0,
+            distortion: Distortion::None,
+            near: None,
+        };
+        for inside in [[0.0, 0.0], [40.0, 30.0], [40.0, 0.0], [12.5, 30.0]] {
+            assert!(is_in_photo(&camera, inside), "{inside:?}");
+        }
+        for outside in [[40.1, 30.0], [-0.1, 3.0], [3.0, 30.1], [f64::NAN, 3.0]] {
+            assert!(!is_in_photo(&camera, outside), "{outside:?}");
+        }
+    }
 }
