@@ -21,17 +21,18 @@ use stonewise_segment::{Detector, StoneFinder, Weights};
 /// surveys of 1 to 200 million points (docs/src/performance.md), rounded up.
 const DISK_PER_POINT: u64 = 90;
 /// Memory at rest, for each of the first ten million points, most of it for photos, and for each other point: 238 MB
-/// at 1.3 million points, 466 MB at 5.2 million, 0.9 GB at 27 million, 1.2 GB at 105 million, 4.2 GB at 332 million.
+/// at 1.3 million points, 466 MB at 5.2 million, 0.9 GB at 27 million, 1.2 GB at 105 million, 3.4 GB at 332 million.
 const MEMORY_BASE: u64 = 200 << 20;
 const FIRST_POINTS: u64 = 10_000_000;
 const MEMORY_PER_FIRST_POINT: u64 = 52;
 const MEMORY_PER_OTHER_POINT: u64 = 14;
-/// Processor time per point, without the search for stones, where a tile takes [`SECONDS_PER_TILE`]: 28 us at 1.3
-/// million points, 29 at 5.2 million, 19 at 332 million. It depends on the number of stones, which is not known
-/// yet.
-const SECONDS_PER_POINT: f64 = 2.5e-5;
-/// Where photos track no stones: 22 us at 0.6 million points, 13 at 332 million.
-const SECONDS_PER_POINT_WITHOUT_PHOTOS: f64 = 1.6e-5;
+/// Processor time for each of the first points and for each other one, without the search for stones, where a tile takes
+/// [`SECONDS_PER_TILE`]: 27 us a point at 1.3 million points, 19 at 5.2 million, 11 at 27 million and at 332
+/// million. It depends on the number of stones, which is not known yet.
+const SECONDS_PER_FIRST_POINT: f64 = 2.2e-5;
+const SECONDS_PER_OTHER_POINT: f64 = 1.0e-5;
+/// Share of that time where photos track no stones: 0.79 at 1 million points, 0.69 at 332 million.
+const WITHOUT_PHOTOS: f64 = 0.75;
 /// Processor time of a tile of the detector on the machine on which the others were measured.
 const SECONDS_PER_TILE: f64 = 0.3;
 /// Edge of the image on which the speed of the machine is measured, pixels.
@@ -77,9 +78,9 @@ fn time(project: &Project, points: u64, photos: &[[u32; 2]], tile: f64) -> Strin
     let cores = rayon::current_num_threads().max(1);
     let has_tracks =
         project.settings.registration.photos.enabled && project.epochs.iter().any(|e| e.photos.is_some());
-    let per_point = match has_tracks {
-        true => SECONDS_PER_POINT,
-        false => SECONDS_PER_POINT_WITHOUT_PHOTOS,
+    let of_points = match has_tracks {
+        true => seconds_of_points(points),
+        false => WITHOUT_PHOTOS * seconds_of_points(points),
     };
 
     // Enlarged photos are looked at in few places.
@@ -89,7 +90,7 @@ fn time(project: &Project, points: u64, photos: &[[u32; 2]], tile: f64) -> Strin
         .iter()
         .map(|[width, height]| tiling.tile_count(*width, *height))
         .sum();
-    let seconds = tile * (per_point / SECONDS_PER_TILE * points as f64 + tiles as f64) / cores as f64;
+    let seconds = tile * (of_points / SECONDS_PER_TILE + tiles as f64) / cores as f64;
     let views = match project.epochs.ids().any(|e| project.has_views(e)) {
         true => ", plus the search for stones in views of the clouds",
         false => "",
@@ -105,6 +106,12 @@ fn time(project: &Project, points: u64, photos: &[[u32; 2]], tile: f64) -> Strin
         true => format!("{low} to {high} min on {on}{views}"),
         false => format!("about {low} min on {on}{views}"),
     }
+}
+
+/// Processor time of a run of this many points, on the machine on which it was measured.
+fn seconds_of_points(points: u64) -> f64 {
+    let first = points.min(FIRST_POINTS);
+    SECONDS_PER_FIRST_POINT * first as f64 + SECONDS_PER_OTHER_POINT * (points - first) as f64
 }
 
 /// Seconds that this machine takes for one tile of the detector, on one thread: the faster of two. `None` where the
@@ -248,7 +255,14 @@ mod tests {
         (5_200_000, 466),
         (26_600_000, 903),
         (104_600_000, 1_188),
-        (332_000_000, 4_200),
+        (332_000_000, 3_442),
+    ];
+    /// Processor time of the same runs, without the quarter, seconds.
+    const TIMES: [(u64, f64); 4] = [
+        (1_280_000, 34.0),
+        (5_200_000, 100.0),
+        (26_600_000, 292.0),
+        (332_000_000, 3611.0),
     ];
 
     #[test]
@@ -261,6 +275,17 @@ mod tests {
             );
         }
         assert_eq!(memory_of_points(u64::MAX), u64::MAX);
+    }
+
+    #[test]
+    fn the_time_of_runs_that_were_measured_is_within_the_spread() {
+        for (points, seconds) in TIMES {
+            let factor = seconds_of_points(points) / seconds;
+            assert!(
+                (1.0 / SPREAD..SPREAD).contains(&factor),
+                "{points}: {factor} times the time measured"
+            );
+        }
     }
 
     #[test]
