@@ -26,8 +26,8 @@ const MEMORY_BASE: u64 = 200 << 20;
 const FIRST_POINTS: u64 = 10_000_000;
 const MEMORY_PER_FIRST_POINT: u64 = 52;
 const MEMORY_PER_OTHER_POINT: u64 = 14;
-/// Processor time for each of the first points and for each other one, without the search for stones, where a tile takes
-/// [`SECONDS_PER_TILE`]: 27 us a point at 1.3 million points, 19 at 5.2 million, 11 at 27 million and at 332
+/// Processor time for each of the first points and for each other one, without the search for stones, where a tile
+/// takes [`SECONDS_PER_TILE`]: 27 us a point at 1.3 million points, 19 at 5.2 million, 11 at 27 million and at 332
 /// million. It depends on the number of stones, which is not known yet.
 const SECONDS_PER_FIRST_POINT: f64 = 2.2e-5;
 const SECONDS_PER_OTHER_POINT: f64 = 1.0e-5;

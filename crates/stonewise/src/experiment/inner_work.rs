@@ -1,5 +1,5 @@
-//! Progress of an experiment: each run is one unit, and the work inside it is the detail. Of several runs at a time, the
-//! detail is what one of them began last.
+//! Progress of an experiment: each run is one unit, and the work inside it is the detail. Of several runs at a time,
+//! the detail is what one of them began last.
 
 use stonewise_core::progress::Progress;
 

@@ -13,8 +13,8 @@ const EXPECTED: f64 = 0.03;
 /// Sum of the squared hidden shares of as many stones as count for that: forty of which half is hidden.
 const STONES_EXPECTED: f64 = 10.0;
 
-/// Least hidden share of a stone that counts for the rate. The motion of a loose stone alone can make a fifth of its face
-/// seem hidden, so that stones of which less is hidden do not show whether clouds are wrong or stones are loose.
+/// Least hidden share of a stone that counts for the rate. The motion of a loose stone alone can make a fifth of its
+/// face seem hidden, so that stones of which less is hidden do not show whether clouds are wrong or stones are loose.
 const PARTLY_HIDDEN: f64 = 0.3;
 
 /// Points across a stone from which on its rims are clear, and below which nothing of them is. A grid of 43 to 113
@@ -86,8 +86,8 @@ mod tests {
 
     #[test]
     fn loose_stones_of_which_little_is_hidden_leave_the_rate_as_it_is() {
-        // Half of each of 400 stones is hidden, and the clouds are wrong about 20 of them: a rate of 0.2. Of 400 others,
-        // all loose, a fifth seems hidden.
+        // Half of each of 400 stones is hidden, and the clouds are wrong about 20 of them. Of 400 others, all loose, a
+        // fifth seems hidden.
         let hidden = |rate: f64| {
             let p_wrong = rate * 0.25 / (rate * 0.25 + 0.01);
             (0..400).map(move |i| (0.5, if i < 20 { p_wrong } else { 0.0 }))
