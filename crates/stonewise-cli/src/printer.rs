@@ -161,8 +161,8 @@ impl Shown {
             (Some(screen), place) => {
                 let words = joined(None, &[self.part.what.as_str(), self.part.detail.as_str()]);
                 match place {
-                    Some(place) => screen.part(&place, &words, self.part.total, self.part.done),
-                    None => screen.part(&words, "", self.part.total, self.part.done),
+                    Some(place) => screen.part(&place, &words, self.part.total),
+                    None => screen.part(&words, "", self.part.total),
                 }
             }
             (None, Some(place)) => self.say_where(Some(place.trim_start()), now),

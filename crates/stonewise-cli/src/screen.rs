@@ -65,7 +65,7 @@ impl Screen {
             *shown = then;
         }
         self.restart();
-        self.part(step, "", 0, 0);
+        self.part(step, "", 0);
     }
 
     /// The time to go is that of the work that begins now.
@@ -73,9 +73,8 @@ impl Screen {
         self.bar.reset();
     }
 
-    /// A part of the work begins, named on a line of its own, of which `done` of `total` units are done; a
-    /// total of 0 where it is unknown.
-    pub fn part(&self, step: &str, words: &str, total: u64, done: u64) {
+    /// A part of the work, named on a line of its own, of `total` units; 0 where their number is unknown.
+    pub fn part(&self, step: &str, words: &str, total: u64) {
         match total {
             0 => self.bar.unset_length(),
             total => self.bar.set_length(total),
