@@ -165,20 +165,20 @@ impl Shown {
                     None => screen.part(&words, "", self.part.total),
                 }
             }
-            (None, Some(place)) => self.say_where(Some(place.trim_start()), now),
+            (None, Some(place)) => self.print_where(Some(place.trim_start()), now),
             // A small part of a step whose files were there.
             (None, None) if self.steps.is_within() => {}
             (None, None) if self.part.detail.is_empty() => {
-                if self.say(&self.part.what.clone(), now) {
+                if self.print_line(&self.part.what.clone(), now) {
                     (self.wait, self.next) = (FIRST_WAIT_S, now + FIRST_WAIT_S);
                 }
             }
-            (None, None) => self.say_where(None, now),
+            (None, None) => self.print_where(None, now),
         }
     }
 
     /// A line with the count and the detail of the work, once the wait is over.
-    fn say_where(&mut self, step: Option<&str>, now: f64) {
+    fn print_where(&mut self, step: Option<&str>, now: f64) {
         if now < self.next {
             return;
         }
@@ -189,11 +189,11 @@ impl Shown {
             total => format!("{}: {} of {total}", self.part.what, self.part.done),
         };
         let words = [count.as_str(), self.part.detail.as_str()];
-        self.say(&joined(step, &words), now);
+        self.print_line(&joined(step, &words), now);
     }
 
     /// A line of progress, unless it is the same as the last. Returns whether it differs.
-    fn say(&mut self, line: &str, now: f64) -> bool {
+    fn print_line(&mut self, line: &str, now: f64) -> bool {
         let differs = std::mem::replace(&mut self.last, line.to_owned()) != line;
         if differs {
             note(&format!("[{now:.1} s] {line}"));

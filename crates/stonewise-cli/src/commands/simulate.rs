@@ -1,14 +1,14 @@
 //! `simulate` and `demo`.
 
 use crate::args::{DemoArgs, Preset, SimulateArgs};
-use crate::commands::{Outcome, run};
+use crate::commands::{Outcome, in_file, run};
 use crate::counted::counted;
 use crate::printer::Printer;
 use anyhow::Result;
 use std::path::Path;
 use stonewise::experiment::not_simulated;
 use stonewise::segmentation;
-use stonewise::{Error, OutputFolder, Owner, Project, Until, read_toml, require_memory};
+use stonewise::{OutputFolder, Owner, Project, Until, read_toml, require_memory};
 use stonewise_core::progress::Progress;
 use stonewise_simulate::{SurveyParams, SurveySummary, write_survey};
 
@@ -81,8 +81,7 @@ pub fn simulate(args: &SimulateArgs, force: bool, printer: &Printer) -> Result<O
         None => SurveyParams::default(),
         Some(path) => {
             let params: SurveyParams = read_toml(path)?;
-            let named = |error| Error::Parameters(format!("{error}: {}", path.display()));
-            params.check().map_err(named)?;
+            params.check().map_err(in_file(path))?;
             params
         }
     };

@@ -1,13 +1,13 @@
 //! `train`.
 
 use crate::args::TrainArgs;
-use crate::commands::Outcome;
+use crate::commands::{Outcome, in_file};
 use crate::counted::counted;
 use crate::printer::Printer;
 use anyhow::{Result, bail};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-use stonewise::{Error, OutputFolder, Owner, read_toml};
+use stonewise::{OutputFolder, Owner, read_toml};
 use stonewise_core::params::Params;
 use stonewise_segment::dataset::{LabelledPhotos, PhotoCrops};
 use stonewise_segment::model::MaskRcnnConfig;
@@ -35,9 +35,8 @@ pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome
     let config = match &args.config {
         Some(path) => {
             let config: Config = read_toml(path)?;
-            let named = |error| Error::Parameters(format!("{error}: {}", path.display()));
             if let Some(training) = &config.training {
-                training.check().map_err(named)?;
+                training.check().map_err(in_file(path))?;
             }
             config
         }

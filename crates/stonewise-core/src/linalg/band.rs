@@ -1,8 +1,7 @@
 //! Symmetric positive definite band matrices: Cholesky factor, solves, log determinant.
 
+use super::fused::{add_scaled, mul_add};
 use pulp::{Arch, Simd, WithSimd};
-use std::array::from_fn;
-use std::ops::Range;
 
 /// Columns that are eliminated together: each later column is then read and written once for all of them.
 const PANEL: usize = 4;
@@ -36,24 +35,23 @@ impl Band {
 
     /// Adds to one entry of the lower triangle.
     pub fn add(&mut self, row: usize, column: usize, value: f64) {
-        let range = self.range(column, row, 1);
-        self.columns[range][0] += value;
+        let place = self.place(column, row);
+        self.columns[place] += value;
     }
 
     /// Adds `scale * values` to four rows of a column, the first of which must lie in the band and not above
     /// the diagonal. `values` must be zero for rows beyond the band or beyond the last row.
     #[inline(always)]
-    pub fn add_run(&mut self, column: usize, first: usize, scale: f64, values: &[f64; 4]) {
-        let start = column * self.stride + first - column;
+    pub fn add_run<S: Simd>(&mut self, column: usize, first: usize, scale: f64, values: &[f64; 4]) {
+        let start = self.place(column, first);
         if let Some(run) = self.columns[start..].first_chunk_mut::<4>() {
-            *run = from_fn(|k| run[k] + scale * values[k]);
+            add_scaled::<S, _>(run, scale, values);
         }
     }
 
     #[inline(always)]
-    fn range(&self, column: usize, first: usize, count: usize) -> Range<usize> {
-        let start = column * self.stride + first - column;
-        start..start + count
+    fn place(&self, column: usize, row: usize) -> usize {
+        column * self.stride + row - column
     }
 
     /// L L' = A; `None` where A is not positive definite. Cost: size * half^2 / 2 multiplications.
@@ -84,7 +82,7 @@ impl WithSimd for Elimination<'_> {
             let end = (start + PANEL).min(size);
             let (done, later) = self.0.columns.split_at_mut(end * stride);
             let panel = &mut done[start * stride..];
-            if !eliminate_within(panel, half, stride) {
+            if !eliminate_within::<S>(panel, half, stride) {
                 return false;
             }
             for i in end..(end + half).min(size) {
@@ -103,7 +101,7 @@ impl WithSimd for Elimination<'_> {
 
 /// Factors the columns of a panel, each by those before it; whether all pivots were positive.
 #[inline(always)]
-fn eliminate_within(panel: &mut [f64], half: usize, stride: usize) -> bool {
+fn eliminate_within<S: Simd>(panel: &mut [f64], half: usize, stride: usize) -> bool {
     for j in 0..panel.len() / stride {
         let (before, rest) = panel.split_at_mut(j * stride);
         let column = &mut rest[..=half];
@@ -111,7 +109,7 @@ fn eliminate_within(panel: &mut [f64], half: usize, stride: usize) -> bool {
             let other = &before[k * stride..][(j - k).min(half + 1)..=half];
             let factor = other.first().copied().unwrap_or(0.0);
             for (x, l) in column.iter_mut().zip(other) {
-                *x -= factor * l;
+                *x = mul_add::<S>(-factor, *l, *x);
             }
         }
         let pivot = column[0];
@@ -128,18 +126,16 @@ fn eliminate_within(panel: &mut [f64], half: usize, stride: usize) -> bool {
 }
 
 /// Takes each part, times its first entry, off the target. All have the same length, a multiple of [`LANES`].
-/// Without fused multiplication, so that every processor finds the same.
 #[inline(always)]
 fn subtract<S: Simd>(simd: S, target: &mut [f64], [a, b, c, d]: [&[f64]; PANEL]) {
-    let (fa, fb) = (simd.splat_f64s(a[0]), simd.splat_f64s(b[0]));
-    let (fc, fd) = (simd.splat_f64s(c[0]), simd.splat_f64s(d[0]));
+    let (fa, fb) = (simd.splat_f64s(-a[0]), simd.splat_f64s(-b[0]));
+    let (fc, fd) = (simd.splat_f64s(-c[0]), simd.splat_f64s(-d[0]));
     let (a, b) = (S::as_simd_f64s(a).0, S::as_simd_f64s(b).0);
     let (c, d) = (S::as_simd_f64s(c).0, S::as_simd_f64s(d).0);
     let target = S::as_mut_simd_f64s(target).0;
     for ((((t, a), b), c), d) in target.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-        let first = simd.add_f64s(simd.mul_f64s(fa, *a), simd.mul_f64s(fb, *b));
-        let second = simd.add_f64s(simd.mul_f64s(fc, *c), simd.mul_f64s(fd, *d));
-        *t = simd.sub_f64s(*t, simd.add_f64s(first, second));
+        let two = simd.mul_add_e_f64s(fb, *b, simd.mul_add_e_f64s(fa, *a, *t));
+        *t = simd.mul_add_e_f64s(fd, *d, simd.mul_add_e_f64s(fc, *c, two));
     }
 }
 
@@ -147,10 +143,13 @@ fn subtract<S: Simd>(simd: S, target: &mut [f64], [a, b, c, d]: [&[f64]; PANEL])
 pub(crate) struct BandInverse(Band);
 
 impl BandInverse {
-    /// Rows `first ..= first + count - 1` of column `column`, all in the band and not above the diagonal.
+    /// Four rows of a column from `first` on, which must be in the band and not above the diagonal. Rows beyond the
+    /// band or the last row are zero.
     #[inline(always)]
-    pub fn column_part(&self, column: usize, first: usize, count: usize) -> &[f64] {
-        &self.0.columns[self.0.range(column, first, count)]
+    pub fn run(&self, column: usize, first: usize) -> &[f64; 4] {
+        self.0.columns[self.0.place(column, first)..]
+            .first_chunk()
+            .unwrap_or(&[0.0; 4])
     }
 }
 
@@ -168,11 +167,7 @@ impl BandFactor {
     /// Replaces the right-hand side by A^-1 times it.
     pub fn solve(&self, rhs: &mut [[f64; 1]]) {
         self.forward(rhs);
-        for j in (0..self.0.size).rev() {
-            let column = self.0.column(j);
-            let known = rhs[j + 1..].as_flattened();
-            rhs[j][0] = (rhs[j][0] - dot(&column[1..], known)) * column[0];
-        }
+        Arch::new().dispatch(Backward { factor: &self.0, rhs });
     }
 
     /// The inverse within the band, column by column from the last (Takahashi, Fagan & Chen 1973). Cost: size
@@ -195,11 +190,33 @@ impl<const N: usize> WithSimd for Forward<'_, N> {
     fn with_simd<S: Simd>(self, _: S) {
         for j in 0..self.factor.size {
             let column = self.factor.column(j);
-            let known = self.rhs[j].map(|y| y * column[0]);
+            let mut known = self.rhs[j];
+            for y in &mut known {
+                *y *= column[0];
+            }
             self.rhs[j] = known;
             for (l, y) in column[1..].iter().zip(&mut self.rhs[j + 1..]) {
-                *y = from_fn(|c| y[c] - l * known[c]);
+                add_scaled::<S, _>(y, -l, &known);
             }
+        }
+    }
+}
+
+/// Back substitution with the transpose of a factor.
+struct Backward<'a> {
+    factor: &'a Band,
+    rhs: &'a mut [[f64; 1]],
+}
+
+impl WithSimd for Backward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for j in (0..self.factor.size).rev() {
+            let column = self.factor.column(j);
+            let known = self.rhs[j + 1..].as_flattened();
+            self.rhs[j][0] = (self.rhs[j][0] - dot::<S>(&column[1..], known)) * column[0];
         }
     }
 }
@@ -227,48 +244,55 @@ impl WithSimd for Inversion<'_> {
             for (k, l) in below.iter().enumerate() {
                 let column = &known[k * stride..][..below.len() - k];
                 let (here, after) = sums[k..].split_at_mut(1);
-                here[0] += l * column[0] + dot_and_add(&column[1..], &below[k + 1..], *l, after);
+                here[0] += l * column[0] + dot_and_add::<S>(&column[1..], &below[k + 1..], *l, after);
             }
             let target = &mut before[j * stride..];
             for (entry, sum) in target[1..].iter_mut().zip(&*sums) {
                 *entry = -pivot * sum;
             }
-            target[0] = pivot * (pivot - dot(below, &target[1..]));
+            target[0] = pivot * (pivot - dot::<S>(below, &target[1..]));
         }
         BandInverse(inverse)
     }
 }
 
-/// The sum of products of a column and a row, computed as in [`dot`]; also adds `factor * column` to `sums`.
+/// The sum of products of a column and a row, in lanes as in [`dot`]; also adds `factor * column` to `sums`.
 #[inline(always)]
-fn dot_and_add(column: &[f64], row: &[f64], factor: f64, sums: &mut [f64]) -> f64 {
+fn dot_and_add<S: Simd>(column: &[f64], row: &[f64], factor: f64, sums: &mut [f64]) -> f64 {
     let (columns, columns_rest) = column.as_chunks::<LANES>();
     let (rows, rows_rest) = row.as_chunks::<LANES>();
     let (totals, totals_rest) = sums.as_chunks_mut::<LANES>();
     let mut lanes = [0.0; LANES];
     for ((z, l), total) in columns.iter().zip(rows).zip(totals) {
-        lanes = from_fn(|k| lanes[k] + z[k] * l[k]);
-        *total = from_fn(|k| total[k] + factor * z[k]);
+        for ((lane, z), l) in lanes.iter_mut().zip(z).zip(l) {
+            *lane = mul_add::<S>(*z, *l, *lane);
+        }
+        add_scaled::<S, _>(total, factor, z);
     }
     let mut rest = 0.0;
     for ((z, l), total) in columns_rest.iter().zip(rows_rest).zip(totals_rest) {
-        rest += z * l;
-        *total += factor * z;
+        rest = mul_add::<S>(*z, *l, rest);
+        *total = mul_add::<S>(factor, *z, *total);
     }
     lanes.iter().sum::<f64>() + rest
 }
 
 /// Sum of products in lanes, so that no product waits for the sum before it. The longer of the two is cut.
 #[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+fn dot<S: Simd>(a: &[f64], b: &[f64]) -> f64 {
     let length = a.len().min(b.len());
     let (a, a_rest) = a[..length].as_chunks::<LANES>();
     let (b, b_rest) = b[..length].as_chunks::<LANES>();
     let mut lanes = [0.0; LANES];
     for (a, b) in a.iter().zip(b) {
-        lanes = from_fn(|k| lanes[k] + a[k] * b[k]);
+        for ((lane, a), b) in lanes.iter_mut().zip(a).zip(b) {
+            *lane = mul_add::<S>(*a, *b, *lane);
+        }
     }
-    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    let mut rest = 0.0;
+    for (a, b) in a_rest.iter().zip(b_rest) {
+        rest = mul_add::<S>(*a, *b, rest);
+    }
     lanes.iter().sum::<f64>() + rest
 }
 
@@ -310,12 +334,12 @@ mod tests {
         let inverse = factor.inverse();
         let expected_inverse = dense.try_inverse().unwrap();
         for j in 0..size {
-            for (k, entry) in inverse
-                .column_part(j, j, (half + 1).min(size - j))
-                .iter()
-                .enumerate()
-            {
-                assert!((entry - expected_inverse[(j + k, j)]).abs() < 1e-12);
+            for k in 0..=half.min(size - 1 - j) {
+                for (row, entry) in (j + k..).zip(inverse.run(j, j + k)) {
+                    let is_kept = row < size && row <= j + half;
+                    let expected = if is_kept { expected_inverse[(row, j)] } else { 0.0 };
+                    assert!((entry - expected).abs() < 1e-12);
+                }
             }
         }
         factor.solve(&mut rhs);

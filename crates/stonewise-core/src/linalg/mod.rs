@@ -4,6 +4,7 @@
 mod band;
 mod block;
 mod dense;
+mod fused;
 mod least_squares;
 mod selected_inverse;
 mod without_negative;
@@ -11,6 +12,7 @@ mod without_negative;
 pub(crate) use band::{Band, BandFactor, BandInverse};
 pub(crate) use block::{BlockFactor, BlockMatrix, BlockPattern};
 pub(crate) use dense::DenseFactor;
+pub(crate) use fused::{add_scaled, mul_add};
 pub use least_squares::least_squares;
 pub(crate) use selected_inverse::SelectedInverse;
 pub use without_negative::without_negative;

@@ -4,7 +4,7 @@ use nalgebra::Point3;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use stonewise_core::progress::{Progress, Silent};
 use stonewise_io::cameras::read_cameras;
@@ -268,6 +268,38 @@ fn an_interrupted_survey_goes_on_where_it_stopped_and_others_projects_stay() {
         fs::read_to_string(own.path().join("stonewise.toml")).unwrap(),
         "mine"
     );
+}
+
+/// Stops the work once the part of this name has begun.
+struct StopIn(&'static str, AtomicBool);
+
+impl Progress for StopIn {
+    fn begin(&self, what: &str, _total: u64) {
+        self.1.fetch_or(what == self.0, Ordering::Relaxed);
+    }
+    fn advance(&self, _units: u64) {}
+    fn is_cancelled(&self) -> bool {
+        self.1.load(Ordering::Relaxed)
+    }
+}
+
+#[test]
+fn a_survey_stops_while_its_masks_are_written_to_one_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let params = SurveyParams {
+        masks: MaskFiles::Coco,
+        ..tiny()
+    };
+    let stop = StopIn("masks of epoch 1", AtomicBool::new(false));
+    let stopped = write_survey(folder.path(), &params, &stop);
+    assert!(
+        matches!(stopped, Err(SimulateError::Interrupted(_))),
+        "{stopped:?}"
+    );
+    let masks = folder.path().join("masks/epoch1.json");
+    assert!(stop.is_cancelled() && !masks.exists());
+    write_survey(folder.path(), &params, &Silent).unwrap();
+    assert!(masks.exists());
 }
 
 #[test]

@@ -13,10 +13,9 @@ use super::point_weights::PointWeights;
 use super::robust::{robust_fit, steepness};
 use super::slope_scatter::SlopeScatter;
 use super::surface_noise::SurfaceNoise;
-use crate::linalg::BandInverse;
+use crate::linalg::{BandInverse, add_scaled};
 use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
 use pulp::{Arch, Simd, WithSimd};
-use std::array::from_fn;
 
 /// The normal equations of a stone's points at one of its motions, and figures of how well both epochs agree
 /// there.
@@ -137,8 +136,8 @@ pub(crate) fn deviance(pair: &LocalPair, motion: &StoneVector, noise: &SurfaceNo
     let motion = LocalMotion::new(motion);
     let of_patch = |PatchPoints { grid, mut epochs, .. }| {
         robust_fit(grid, &mut epochs, noise, layout).map_or(0.0, |fit| {
-            let of_points = |(observations, sigma): (&Vec<WeightedPoint>, f64)| -> f64 {
-                fit.squares(observations, sigma).map(|square| square - 1.0).sum()
+            let of_points = |(points, sigma): (&Vec<WeightedPoint>, f64)| {
+                fit.square_sum(points, sigma) - points.len() as f64
             };
             fit.surface_deviance(noise) + epochs.iter().zip(noise.sigma_m).map(of_points).sum::<f64>()
         })
@@ -228,7 +227,7 @@ impl WithSimd for EpochPoints<'_> {
         let sigma = setting.noise.sigma_m[epoch];
         let mut squares = 0.0;
         for o in self.points {
-            let [h, hu, hv] = fit.surface(&o.basis);
+            let [h, hu, hv] = fit.surface::<S>(&o.basis);
             let r = o.position[2] - h;
             self.cells.add(epoch, o, r, [hu, hv]);
             sum.points[epoch] += 1;
@@ -237,31 +236,47 @@ impl WithSimd for EpochPoints<'_> {
             squares += square;
             sum.deviance += square;
             let w = o.weight / (sigma * sigma);
-            let share = self.shares.of(epoch, &o.basis);
-            let row = setting.jacobian(o, [hu, hv]).map(|j| share * j);
-            add_scaled(&mut sum.gradient.data.0[0], r * w, &row);
+            let share = self.shares.of::<S>(epoch, &o.basis);
+            let jacobian = setting.jacobian(o, [hu, hv]);
+            let gradient = &mut sum.gradient.data.0[0];
+            add_scaled::<S, _>(gradient, share * w * r, &jacobian);
             if let Some(inverse) = self.inverse {
                 // The surface follows each point a little, most at the edge of the points, and takes the slope
                 // with it: residuals and slopes are correlated by minus this covariance, which the gradient of
-                // the determinant makes good.
-                let bias = setting.jacobian(o, fit.slope_covariance(&o.basis, inverse));
-                let level = setting.jacobian(o, [0.0; 2]);
-                let by: [f64; 9] = from_fn(|k| bias[k] - level[k]);
-                add_scaled(&mut sum.gradient.data.0[0], -(share * w), &by);
+                // the determinant makes good. The jacobian is affine in the slopes: what their covariance adds to it
+                // is the difference of two.
+                let [with_u, with_v] = fit.slope_covariance::<S>(&o.basis, inverse);
+                let tilted = setting.jacobian(o, [hu + with_u, hv + with_v]);
+                add_scaled::<S, _>(gradient, -(share * w), &tilted);
+                add_scaled::<S, _>(gradient, share * w, &jacobian);
             }
-            scatter(&o.basis, w, &row, self.coupling);
-            for (c, j) in row.iter().enumerate() {
-                add_scaled(&mut sum.information.data.0[c], w * j, &row);
-            }
+            scatter::<S, _>(&o.basis, share * w, &jacobian, self.coupling);
+            add_square::<S>(&mut sum.information, share * share * w, &jacobian);
         }
         squares
     }
 }
 
-/// Adds `factor * values` to a column.
+/// Adds `weight * row' * row` to the lower triangle of a matrix; what is above the diagonal is set by
+/// [`take_off_surface`].
 #[inline(always)]
-fn add_scaled(column: &mut [f64; 9], factor: f64, values: &[f64; 9]) {
-    *column = from_fn(|k| column[k] + factor * values[k]);
+fn add_square<S: Simd>(matrix: &mut Matrix9, weight: f64, row: &[f64; 9]) {
+    // Whole vectors of four or eight, which start at the diagonal or a little above it.
+    for (c, (column, value)) in matrix.data.0.iter_mut().zip(row).enumerate() {
+        match c {
+            0 => add_scaled::<S, _>(column, weight * value, row),
+            1..5 => add_tail::<S, 8>(column, weight * value, row),
+            _ => add_tail::<S, 4>(column, weight * value, row),
+        }
+    }
+}
+
+/// Adds `factor * row` to the last N entries of a column.
+#[inline(always)]
+fn add_tail<S: Simd, const N: usize>(column: &mut [f64; 9], factor: f64, row: &[f64; 9]) {
+    if let (Some(tail), Some(values)) = (column.last_chunk_mut::<N>(), row.last_chunk()) {
+        add_scaled::<S, _>(tail, factor, values);
+    }
 }
 
 /// How the epochs share the stone's motion at each place of a patch: each takes the more of it, the less its
@@ -279,20 +294,18 @@ struct Shares {
 impl Shares {
     fn new(grid: &PatchGrid, epochs: &[Vec<WeightedPoint>; 2], noise: &SurfaceNoise) -> Self {
         let weights = [0, 1].map(|epoch| {
-            let mut sums = vec![[0.0]; grid.coefficient_count()];
-            let sigma = noise.sigma_m[epoch];
-            for o in &epochs[epoch] {
-                scatter(&o.basis, o.weight / (sigma * sigma), &[1.0], &mut sums);
-            }
-            sums
+            let sums = vec![[0.0]; grid.coefficient_count()];
+            let (points, sigma) = (&epochs[epoch], noise.sigma_m[epoch]);
+            Arch::new().dispatch(WeightSums { points, sigma, sums })
         });
         Self { weights }
     }
 
     /// By how much of the motion a point of an epoch moves: the later one with it, the first one against it.
     #[inline(always)]
-    fn of(&self, epoch: usize, basis: &Basis) -> f64 {
-        let [first, second] = [0, 1].map(|e| gather(basis, &self.weights[e]));
+    fn of<S: Simd>(&self, epoch: usize, basis: &Basis) -> f64 {
+        let first = basis.gather::<S>(&self.weights[0]);
+        let second = basis.gather::<S>(&self.weights[1]);
         match epoch {
             0 => -second / (first + second),
             _ => first / (first + second),
@@ -300,30 +313,35 @@ impl Shares {
     }
 }
 
-/// The sum of the coefficients times the basis.
-#[inline(always)]
-fn gather(basis: &Basis, coefficients: &[[f64; 1]]) -> f64 {
-    let [short, long] = basis.value;
-    let along = |(a, l): (usize, f64)| {
-        let first = basis.row(a);
-        let row = coefficients[first..first + 4].as_flattened();
-        l * row.iter().zip(short).map(|(c, b)| c * b).sum::<f64>()
-    };
-    long.into_iter().enumerate().map(along).sum()
+/// Adds up the weights of points about each coefficient.
+struct WeightSums<'a> {
+    points: &'a [WeightedPoint],
+    sigma: f64,
+    sums: Vec<[f64; 1]>,
+}
+
+impl WithSimd for WeightSums<'_> {
+    type Output = Vec<[f64; 1]>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, _: S) -> Vec<[f64; 1]> {
+        for point in self.points {
+            let weight = point.weight / (self.sigma * self.sigma);
+            scatter::<S, _>(&point.basis, weight, &[1.0], &mut self.sums);
+        }
+        self.sums
+    }
 }
 
 /// Adds `weight * basis * row` to the right-hand sides of the coefficients, one column for each of the motion's
 /// unknowns.
 #[inline(always)]
-fn scatter<const N: usize>(basis: &Basis, weight: f64, row: &[f64; N], into: &mut [[f64; N]]) {
+fn scatter<S: Simd, const N: usize>(basis: &Basis, weight: f64, row: &[f64; N], into: &mut [[f64; N]]) {
     let [short, long] = basis.value;
     for (a, l) in long.into_iter().enumerate() {
         let first = basis.row(a);
         for (target, b) in into[first..first + 4].iter_mut().zip(short) {
-            let w = weight * l * b;
-            for c in 0..N {
-                target[c] += w * row[c];
-            }
+            add_scaled::<S, _>(target, weight * l * b, row);
         }
     }
 }
@@ -394,8 +412,10 @@ impl PatchCells {
 mod tests {
     use super::*;
     use nalgebra::Vector3;
+    use pulp::Scalar;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+    use std::array::from_fn;
 
     const NOISE: SurfaceNoise = SurfaceNoise {
         sigma_m: [0.004, 0.005],
@@ -539,6 +559,20 @@ mod tests {
         let relative = (from_stored.information - anew.information).norm() / anew.information.norm();
         assert!(relative < 0.02, "{relative}");
         assert_ne!(from_stored.gradient, anew.gradient);
+    }
+
+    #[test]
+    fn the_lower_triangle_gets_the_square_of_a_row() {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let start = Matrix9::from_fn(|_, _| rng.random_range(-1.0..1.0));
+        let row: [f64; 9] = from_fn(|_| rng.random_range(-1.0..1.0));
+        let mut matrix = start;
+        add_square::<Scalar>(&mut matrix, 0.3, &row);
+        for r in 0..9 {
+            for c in 0..=r {
+                assert!((matrix[(r, c)] - start[(r, c)] - 0.3 * row[r] * row[c]).abs() < 1e-15);
+            }
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::layout::Layout;
 use super::local_motion::LocalMotion;
 use super::local_pair::LocalPair;
 use super::patch_fit::PatchFit;
-use super::patch_grid::{Observed, WeightedPoint};
+use super::patch_grid::Observed;
 use super::patches::{PatchChoice, PatchPoints, pool_into_patches};
 use super::robust::robust_fit;
 use super::surface_noise::SurfaceNoise;
@@ -149,8 +149,7 @@ fn scatter(patch: &PatchPoints, noise: &SurfaceNoise, layout: &Layout) -> [f64; 
         return [0.0; 2];
     };
     epochs.map(|points| {
-        let distance = |o: &WeightedPoint| (o.position[2] - fit.surface(&o.basis)[0]).abs();
-        let mut distances: Vec<f64> = points.iter().map(distance).collect();
+        let mut distances: Vec<f64> = fit.residuals(&points).into_iter().map(f64::abs).collect();
         upper_median(&mut distances).unwrap_or(0.0)
     })
 }

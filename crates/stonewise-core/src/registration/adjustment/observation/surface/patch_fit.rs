@@ -3,9 +3,10 @@
 //! Points of both epochs observe the surface with noise `sigma`; the coefficients are eliminated, which
 //! leaves the normal equations of the motion alone.
 
-use super::patch_grid::{Basis, Observed, PatchGrid, WeightedPoint};
+use super::patch_grid::{Basis, Observed, PatchGrid, WeightedPoint, dot};
 use super::surface_noise::SurfaceNoise;
-use crate::linalg::{BandFactor, BandInverse};
+use crate::linalg::{BandFactor, BandInverse, add_scaled, mul_add};
+use pulp::{Arch, Simd, WithSimd};
 
 /// Unknowns that second differences leave free: those of a plane.
 const UNPENALISED: f64 = 3.0;
@@ -49,59 +50,71 @@ impl PatchFit {
 
     /// Height and its slopes along u and v.
     #[inline(always)]
-    pub fn surface(&self, basis: &Basis) -> [f64; 3] {
+    pub fn surface<S: Simd>(&self, basis: &Basis) -> [f64; 3] {
+        let value = basis.over_long::<S>(&basis.value[1], &self.coefficients);
+        let slope = basis.over_long::<S>(&basis.slope[1], &self.coefficients);
         let (s, l) = (self.grid.short, 1 - self.grid.short);
         let mut out = [0.0; 3];
-        for a in 0..4 {
-            let first = basis.row(a);
-            let row = self.coefficients[first..first + 4].as_flattened();
-            let along = |b: &[f64; 4]| row.iter().zip(b).map(|(c, b)| c * b).sum::<f64>();
-            let (value, slope) = (along(&basis.value[0]), along(&basis.slope[0]));
-            out[0] += value * basis.value[1][a];
-            out[1 + s] += slope * basis.value[1][a];
-            out[1 + l] += value * basis.slope[1][a];
-        }
+        out[0] = dot(&value, &basis.value[0]);
+        out[1 + s] = dot(&value, &basis.slope[0]);
+        out[1 + l] = dot(&slope, &basis.value[0]);
         out
     }
 
     /// Covariance of the height with its slopes along u and v, given the points: `inverse` is that of
     /// [`Self::factor`].
+    ///
+    /// Block Z_ac of the inverse belongs to the places a and c along the long axis and to all four along the short one.
+    /// The covariance with the slope along the short axis is the sum over a and c of long_a long_c short_slope' Z_ac
+    /// short; with that along the long axis, of long_slope_a long_c short' Z_ac short.
     #[inline(always)]
-    pub fn slope_covariance(&self, basis: &Basis, inverse: &BandInverse) -> [f64; 2] {
-        let [short, long] = basis.value;
-        // Covariance of each coefficient with the height.
-        let mut with_height = [[0.0; 4]; 4];
-
+    pub fn slope_covariance<S: Simd>(&self, basis: &Basis, inverse: &BandInverse) -> [f64; 2] {
+        let ([short, long], [short_slope, long_slope]) = (&basis.value, &basis.slope);
+        // Sums over the blocks below the diagonal of Z_ca short and Z_ca short_slope, weighted with long_a long_c, and
+        // of Z_ca short, weighted with long_slope_a long_c + long_a long_slope_c.
+        let mut below = [[0.0; 4]; 3];
+        // Columns of the blocks on the diagonal, from the diagonal down, weighted with long_a long_a and long_slope_a
+        // long_a.
+        let mut diagonal = [[[0.0; 4]; 4]; 2];
         for a in 0..4 {
             for b in 0..4 {
                 let column = basis.row(a) + b;
-                let own = inverse.column_part(column, column, 4 - b);
-                for (d, z) in (b..4).zip(own) {
-                    with_height[a][b] += z * long[a] * short[d];
-                    if d > b {
-                        with_height[a][d] += z * long[a] * short[b];
-                    }
+                let own = inverse.run(column, column);
+                add_scaled::<S, _>(&mut diagonal[0][b], long[a] * long[a], own);
+                add_scaled::<S, _>(&mut diagonal[1][b], long[a] * long_slope[a], own);
+            }
+            for c in a + 1..4 {
+                let (mut with_value, mut with_slope) = ([0.0; 4], [0.0; 4]);
+                for b in 0..4 {
+                    let part = inverse.run(basis.row(a) + b, basis.row(c));
+                    add_scaled::<S, _>(&mut with_value, short[b], part);
+                    add_scaled::<S, _>(&mut with_slope, short_slope[b], part);
                 }
-                for c in a + 1..4 {
-                    let part = inverse.column_part(column, basis.row(c), 4);
-                    let sum: f64 = part.iter().zip(short).map(|(z, s)| z * s).sum();
-                    with_height[a][b] += sum * long[c];
-                    let back = long[a] * short[b];
-                    for (target, z) in with_height[c].iter_mut().zip(part) {
-                        *target += z * back;
-                    }
-                }
+                add_scaled::<S, _>(&mut below[0], long[a] * long[c], &with_value);
+                add_scaled::<S, _>(&mut below[1], long[a] * long[c], &with_slope);
+                let once = long_slope[a] * long[c] + long[a] * long_slope[c];
+                add_scaled::<S, _>(&mut below[2], once, &with_value);
             }
         }
-
-        let (s, l) = (self.grid.short, 1 - self.grid.short);
-        let mut out = [0.0; 2];
-        for a in 0..4 {
-            let along = |b: &[f64; 4]| with_height[a].iter().zip(b).map(|(c, b)| c * b).sum::<f64>();
-            out[s] += along(&basis.slope[0]) * long[a];
-            out[l] += along(&short) * basis.slope[1][a];
+        let mut along_short = dot(&below[0], short_slope) + dot(&below[1], short);
+        let mut along_long = dot(&below[2], short);
+        for b in 0..4 {
+            for (k, d) in (b..4).enumerate() {
+                // An entry off the diagonal also stands for its mirror image.
+                let (cross, square) = match k {
+                    0 => (short[b] * short_slope[b], short[b] * short[b]),
+                    _ => (
+                        short_slope[b] * short[d] + short[b] * short_slope[d],
+                        2.0 * short[b] * short[d],
+                    ),
+                };
+                along_short = mul_add::<S>(diagonal[0][b][k], cross, along_short);
+                along_long = mul_add::<S>(diagonal[1][b][k], square, along_long);
+            }
         }
-
+        let mut out = [0.0; 2];
+        out[self.grid.short] = along_short;
+        out[1 - self.grid.short] = along_long;
         out
     }
 
@@ -114,20 +127,40 @@ impl PatchFit {
     /// Minus twice the log marginal likelihood of the points, up to a constant.
     pub fn deviance(&self, epochs: [&[WeightedPoint]; 2], noise: &SurfaceNoise) -> f64 {
         let mut sum = self.surface_deviance(noise);
-        for (observations, sigma) in epochs.into_iter().zip(noise.sigma_m) {
-            for square in self.squares(observations, sigma) {
-                sum += square + 2.0 * sigma.ln();
-            }
+        for (points, sigma) in epochs.into_iter().zip(noise.sigma_m) {
+            sum += self.square_sum(points, sigma) + points.len() as f64 * 2.0 * sigma.ln();
         }
         sum
     }
 
-    /// Weighted squared residual of each point of an epoch, in units of its variance.
-    pub fn squares(&self, observations: &[WeightedPoint], sigma: f64) -> impl Iterator<Item = f64> {
-        observations.iter().map(move |o| {
-            let r = o.position[2] - self.surface(&o.basis)[0];
-            o.weight * r * r / (sigma * sigma)
-        })
+    /// Sum of the weighted squared residuals of the points of an epoch, in units of their variance.
+    pub fn square_sum(&self, points: &[WeightedPoint], sigma: f64) -> f64 {
+        let residuals = self.residuals(points).into_iter().zip(points);
+        residuals.map(|(r, point)| point.weight * r * r).sum::<f64>() / (sigma * sigma)
+    }
+
+    /// Heights of points above the surface, metres.
+    pub fn residuals(&self, points: &[WeightedPoint]) -> Vec<f64> {
+        Arch::new().dispatch(Residuals { fit: self, points })
+    }
+}
+
+/// The residuals of points. The loop is compiled for the widest vectors of the processor.
+struct Residuals<'a> {
+    fit: &'a PatchFit,
+    points: &'a [WeightedPoint],
+}
+
+impl WithSimd for Residuals<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<f64> {
+        let mut residuals = vec![0.0; self.points.len()];
+        for (residual, point) in residuals.iter_mut().zip(self.points) {
+            *residual = point.position[2] - point.basis.gather::<S>(&self.fit.coefficients);
+        }
+        residuals
     }
 }
 
@@ -135,6 +168,7 @@ impl PatchFit {
 mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
+    use pulp::Scalar;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -178,6 +212,24 @@ mod tests {
         DVector::from_fn(8 * 6, |i, _| along(u, i / 6) * along(v, i % 6))
     }
 
+    /// The surface at a place, to be computed with any vectors.
+    #[derive(Clone, Copy)]
+    struct At<'a> {
+        fit: &'a PatchFit,
+        inverse: &'a BandInverse,
+        basis: Basis,
+    }
+
+    impl WithSimd for At<'_> {
+        type Output = ([f64; 3], [f64; 2]);
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+            let surface = self.fit.surface::<S>(&self.basis);
+            (surface, self.fit.slope_covariance::<S>(&self.basis, self.inverse))
+        }
+    }
+
     #[test]
     fn the_fit_is_the_penalised_least_squares_solution() {
         let wave = |u: f64, v: f64| 0.004 * (60.0 * u).sin() + 0.003 * (80.0 * v).cos();
@@ -215,7 +267,16 @@ mod tests {
         let band = fit.factor.inverse();
         for (u, v) in [(0.013, 0.021), (0.05, 0.03), (0.099, 0.001), (0.0, 0.06)] {
             let basis = dense_basis(u, v);
-            let [h, hu, hv] = fit.surface(&grid().basis(u, v));
+            let at = At {
+                fit: &fit,
+                inverse: &band,
+                basis: grid().basis(u, v),
+            };
+            let plain = at.with_simd(Scalar::new());
+            let ([h, hu, hv], covariance) = Arch::new().dispatch(at);
+            assert!(
+                (plain.0[0] - h).abs() < 1e-12 && (plain.1[0] - covariance[0]).abs() < 1e-9 * NOISE.tau_m
+            );
             assert!((h - basis.dot(&solution)).abs() < 1e-10, "{u} {v}");
             // One-sided where the patch ends: evaluation outside is clamped to the border.
             let step = 1e-6;
@@ -224,7 +285,6 @@ mod tests {
                 (dense_basis(u + du * step, v + dv * step) - back) / (2.0 * step)
             };
             let slopes = [slope(1.0, 0.0), slope(0.0, 1.0)];
-            let covariance = fit.slope_covariance(&grid().basis(u, v), &band);
             for ((slope, found), with_height) in slopes.iter().zip([hu, hv]).zip(covariance) {
                 assert!((found - slope.dot(&solution)).abs() < 1e-6, "{u} {v}");
                 let expected = (slope.transpose() * &inverse * &basis)[0];
@@ -242,7 +302,7 @@ mod tests {
         let epochs = [points(3, 60, plane), points(4, 60, plane)];
         let fit = PatchFit::new(grid(), [&epochs[0], &epochs[1]], &NOISE).unwrap();
         assert!(fit.prior_quadratic < 1e-6, "{}", fit.prior_quadratic);
-        let [h, hu, hv] = fit.surface(&grid().basis(0.04, 0.03));
+        let [h, hu, hv] = fit.surface::<Scalar>(&grid().basis(0.04, 0.03));
         assert!((h - plane(0.04, 0.03)).abs() < 1e-7);
         assert!((hu - 0.3).abs() < 1e-5 && (hv + 0.2).abs() < 1e-5, "{hu} {hv}");
     }

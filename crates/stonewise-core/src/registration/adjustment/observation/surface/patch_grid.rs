@@ -4,9 +4,8 @@
 //! `tau^2` (Lang & Brezger 2004, Bayesian P-splines).
 
 use super::surface_noise::SurfaceNoise;
-use crate::linalg::Band;
+use crate::linalg::{Band, add_scaled, mul_add};
 use pulp::{Arch, Simd, WithSimd};
-use std::array::from_fn;
 
 /// Information of every coefficient in units of the prior's: keeps a patch whose points lie on a line
 /// solvable; far below any observation's weight.
@@ -58,6 +57,31 @@ impl Basis {
     pub fn row(&self, long: usize) -> usize {
         self.first + long * self.stride
     }
+
+    /// The coefficients of each place along the short axis, summed over the long one with these factors.
+    #[inline(always)]
+    pub fn over_long<S: Simd>(&self, long: &[f64; 4], coefficients: &[[f64; 1]]) -> [f64; 4] {
+        let mut sums = [0.0; 4];
+        for (a, factor) in long.iter().enumerate() {
+            let row = coefficients[self.row(a)..].as_flattened();
+            if let Some(row) = row.first_chunk() {
+                add_scaled::<S, _>(&mut sums, *factor, row);
+            }
+        }
+        sums
+    }
+
+    /// The sum of the coefficients times the basis.
+    #[inline(always)]
+    pub fn gather<S: Simd>(&self, coefficients: &[[f64; 1]]) -> f64 {
+        dot(&self.over_long::<S>(&self.value[1], coefficients), &self.value[0])
+    }
+}
+
+/// Sum of products.
+#[inline(always)]
+pub(crate) fn dot(a: &[f64; 4], b: &[f64; 4]) -> f64 {
+    (a[0] * b[0] + a[2] * b[2]) + (a[1] * b[1] + a[3] * b[3])
 }
 
 impl PatchGrid {
@@ -215,28 +239,34 @@ impl WithSimd for Observations<'_> {
     fn with_simd<S: Simd>(self, _: S) {
         for point in self.points {
             let weight = point.weight / self.variance;
-            add_observation(point, weight, self.matrix, self.rhs);
+            add_observation::<S>(point, weight, self.matrix, self.rhs);
         }
     }
 }
 
 /// Adds what a point says: products of its basis along the short axis, times those along the long one.
 #[inline(always)]
-fn add_observation(point: &WeightedPoint, weight: f64, matrix: &mut Band, rhs: &mut [[f64; 1]]) {
+fn add_observation<S: Simd>(point: &WeightedPoint, weight: f64, matrix: &mut Band, rhs: &mut [[f64; 1]]) {
     let [short, long] = point.basis.value;
-    let products: [[f64; 4]; 4] = from_fn(|b| from_fn(|d| weight * short[b] * short[d]));
+    let mut products = [[0.0; 4]; 4];
     // The products from the diagonal on, as columns of the lower triangle hold them.
-    let below: [[f64; 4]; 4] = from_fn(|b| from_fn(|k| products[b].get(b + k).copied().unwrap_or(0.0)));
+    let mut below = [[0.0; 4]; 4];
+    for b in 0..4 {
+        for d in 0..4 {
+            products[b][d] = weight * short[b] * short[d];
+        }
+        below[b][..4 - b].copy_from_slice(&products[b][b..]);
+    }
     for a in 0..4 {
         let row = point.basis.row(a);
         let along = weight * long[a];
         for (entry, b) in rhs[row..row + 4].iter_mut().zip(short) {
-            entry[0] += along * b * point.position[2];
+            entry[0] = mul_add::<S>(along * b, point.position[2], entry[0]);
         }
         for b in 0..4 {
-            matrix.add_run(row + b, row + b, long[a] * long[a], &below[b]);
+            matrix.add_run::<S>(row + b, row + b, long[a] * long[a], &below[b]);
             for c in a + 1..4 {
-                matrix.add_run(row + b, point.basis.row(c), long[a] * long[c], &products[b]);
+                matrix.add_run::<S>(row + b, point.basis.row(c), long[a] * long[c], &products[b]);
             }
         }
     }

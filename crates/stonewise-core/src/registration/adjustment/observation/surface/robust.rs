@@ -11,6 +11,8 @@ use pulp::{Arch, Simd, WithSimd};
 const REWEIGHTINGS: usize = 2;
 /// A weight that changes by less needs no other fit.
 const CHANGED: f64 = 0.05;
+/// Points whose weights are computed side by side.
+const CHUNK: usize = 32;
 
 /// Factor on a point's weight where the surface has these slopes: noise goes in all directions, so what
 /// counts is the distance from the surface and not that along the height (orthogonal distance regression,
@@ -67,23 +69,28 @@ impl WithSimd for Weights<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Vec<f64> {
         let mut weights = vec![0.0; self.points.len()];
-        for (weight, point) in weights.iter_mut().zip(self.points) {
-            *weight = weight_of(self.fit, point, self.limit_m);
+        for (weights, points) in weights.chunks_mut(CHUNK).zip(self.points.chunks(CHUNK)) {
+            let (mut residuals, mut along_u, mut along_v) = ([0.0; CHUNK], [0.0; CHUNK], [0.0; CHUNK]);
+            for (k, point) in points.iter().enumerate() {
+                let [h, hu, hv] = self.fit.surface::<S>(&point.basis);
+                (residuals[k], along_u[k], along_v[k]) = (point.position[2] - h, hu, hv);
+            }
+            // A loop of its own, without branches, so that it is compiled to vectors.
+            let mut all = [0.0; CHUNK];
+            for (k, weight) in all.iter_mut().enumerate() {
+                *weight = weight_of(residuals[k], [along_u[k], along_v[k]], self.limit_m);
+            }
+            weights.copy_from_slice(&all[..weights.len()]);
         }
         weights
     }
 }
 
-/// Weight of a point by the slopes of the surface there and its distance from it.
+/// Weight of a point by its height above the surface and the slopes of the surface there; a point farther than
+/// `limit_m` from the surface weighs less.
 #[inline(always)]
-fn weight_of(fit: &PatchFit, point: &WeightedPoint, limit_m: f64) -> f64 {
-    let [h, hu, hv] = fit.surface(&point.basis);
-    let steepness = steepness([hu, hv]);
-    let distance = (point.position[2] - h).abs() * steepness.sqrt();
-    let outlying = if distance > limit_m {
-        (limit_m / distance).powi(2)
-    } else {
-        1.0
-    };
-    steepness * outlying
+fn weight_of(residual: f64, slopes: [f64; 2], limit_m: f64) -> f64 {
+    let steepness = steepness(slopes);
+    let square = residual * residual * steepness;
+    steepness * (limit_m * limit_m / square).min(1.0)
 }
