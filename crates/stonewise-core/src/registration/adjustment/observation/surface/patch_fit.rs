@@ -75,13 +75,12 @@ impl PatchFit {
         let mut below = [[0.0; 4]; 3];
         // Columns of the blocks on the diagonal, from the diagonal down, weighted with long_a long_a and long_slope_a
         // long_a.
-        let mut diagonal = [[[0.0; 4]; 4]; 2];
+        let (mut diagonal, mut diagonal_slope) = ([[0.0; 4]; 4], [[0.0; 4]; 4]);
         for a in 0..4 {
-            for b in 0..4 {
-                let column = basis.row(a) + b;
-                let own = inverse.run(column, column);
-                add_scaled::<S, _>(&mut diagonal[0][b], long[a] * long[a], own);
-                add_scaled::<S, _>(&mut diagonal[1][b], long[a] * long_slope[a], own);
+            for (b, (with_value, with_slope)) in diagonal.iter_mut().zip(&mut diagonal_slope).enumerate() {
+                let own = inverse.run(basis.row(a) + b, basis.row(a) + b);
+                add_scaled::<S, _>(with_value, long[a] * long[a], own);
+                add_scaled::<S, _>(with_slope, long[a] * long_slope[a], own);
             }
             for c in a + 1..4 {
                 let (mut with_value, mut with_slope) = ([0.0; 4], [0.0; 4]);
@@ -108,8 +107,8 @@ impl PatchFit {
                         2.0 * short[b] * short[d],
                     ),
                 };
-                along_short = mul_add::<S>(diagonal[0][b][k], cross, along_short);
-                along_long = mul_add::<S>(diagonal[1][b][k], square, along_long);
+                along_short = mul_add::<S>(diagonal[b][k], cross, along_short);
+                along_long = mul_add::<S>(diagonal_slope[b][k], square, along_long);
             }
         }
         let mut out = [0.0; 2];
