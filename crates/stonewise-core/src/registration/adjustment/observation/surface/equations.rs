@@ -250,7 +250,7 @@ impl WithSimd for EpochPoints<'_> {
                 add_scaled::<S, _>(gradient, -(share * w), &tilted);
                 add_scaled::<S, _>(gradient, share * w, &jacobian);
             }
-            scatter::<S, _>(&o.basis, share * w, &jacobian, self.coupling);
+            o.basis.scatter::<S, _>(share * w, &jacobian, self.coupling);
             add_square::<S>(&mut sum.information, share * share * w, &jacobian);
         }
         squares
@@ -327,22 +327,9 @@ impl WithSimd for WeightSums<'_> {
     fn with_simd<S: Simd>(mut self, _: S) -> Vec<[f64; 1]> {
         for point in self.points {
             let weight = point.weight / (self.sigma * self.sigma);
-            scatter::<S, _>(&point.basis, weight, &[1.0], &mut self.sums);
+            point.basis.scatter::<S, _>(weight, &[1.0], &mut self.sums);
         }
         self.sums
-    }
-}
-
-/// Adds `weight * basis * row` to the right-hand sides of the coefficients, one column for each of the motion's
-/// unknowns.
-#[inline(always)]
-fn scatter<S: Simd, const N: usize>(basis: &Basis, weight: f64, row: &[f64; N], into: &mut [[f64; N]]) {
-    let [short, long] = basis.value;
-    for (a, l) in long.into_iter().enumerate() {
-        let first = basis.row(a);
-        for (target, b) in into[first..first + 4].iter_mut().zip(short) {
-            add_scaled::<S, _>(target, weight * l * b, row);
-        }
     }
 }
 

@@ -4,7 +4,7 @@
 //! `tau^2` (Lang & Brezger 2004, Bayesian P-splines).
 
 use super::surface_noise::SurfaceNoise;
-use crate::linalg::{Band, add_scaled, mul_add};
+use crate::linalg::{Band, add_scaled};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Information of every coefficient in units of the prior's: keeps a patch whose points lie on a line
@@ -75,6 +75,18 @@ impl Basis {
     #[inline(always)]
     pub fn gather<S: Simd>(&self, coefficients: &[[f64; 1]]) -> f64 {
         dot(&self.over_long::<S>(&self.value[1], coefficients), &self.value[0])
+    }
+
+    /// Adds `weight * basis * row` to the right-hand sides of the coefficients.
+    #[inline(always)]
+    pub fn scatter<S: Simd, const N: usize>(&self, weight: f64, row: &[f64; N], into: &mut [[f64; N]]) {
+        let [short, long] = self.value;
+        for (a, l) in long.into_iter().enumerate() {
+            let first = self.row(a);
+            for (target, b) in into[first..first + 4].iter_mut().zip(short) {
+                add_scaled::<S, _>(target, weight * l * b, row);
+            }
+        }
     }
 }
 
@@ -257,12 +269,9 @@ fn add_observation<S: Simd>(point: &WeightedPoint, weight: f64, matrix: &mut Ban
         }
         below[b][..4 - b].copy_from_slice(&products[b][b..]);
     }
+    point.basis.scatter::<S, _>(weight, &[point.position[2]], rhs);
     for a in 0..4 {
         let row = point.basis.row(a);
-        let along = weight * long[a];
-        for (entry, b) in rhs[row..row + 4].iter_mut().zip(short) {
-            entry[0] = mul_add::<S>(along * b, point.position[2], entry[0]);
-        }
         for b in 0..4 {
             matrix.add_run::<S>(row + b, row + b, long[a] * long[a], &below[b]);
             for c in a + 1..4 {
