@@ -14,6 +14,7 @@ mod explain;
 mod info;
 mod init;
 mod outcome;
+mod parameters;
 mod part;
 mod photos;
 mod report;
@@ -36,16 +37,9 @@ pub use outcome::Outcome;
 pub use run::measure;
 pub use simulate::simulate_survey;
 use std::error::Error;
-use std::fmt::Display;
 use std::num::NonZero;
-use std::path::Path;
 use stonewise::{Until, require_start};
 pub use version::version_details;
-
-/// An error in a file of parameters, with the name of the file.
-fn in_file<E: Display>(path: &Path) -> impl FnOnce(E) -> stonewise::Error {
-    move |error| stonewise::Error::Parameters(format!("{error}: {}", path.display()))
-}
 
 /// Runs the command that the arguments name.
 pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {

@@ -1,7 +1,8 @@
 //! `simulate` and `demo`.
 
 use crate::args::{DemoArgs, Preset, SimulateArgs};
-use crate::commands::{Outcome, in_file, run};
+use crate::commands::parameters::in_file;
+use crate::commands::{Outcome, run};
 use crate::counted::counted;
 use crate::printer::Printer;
 use anyhow::Result;

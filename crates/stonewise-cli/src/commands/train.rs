@@ -1,7 +1,8 @@
 //! `train`.
 
 use crate::args::TrainArgs;
-use crate::commands::{Outcome, in_file};
+use crate::commands::Outcome;
+use crate::commands::parameters::in_file;
 use crate::counted::counted;
 use crate::printer::Printer;
 use anyhow::{Result, bail};
