@@ -161,41 +161,41 @@ impl Adjustment {
         likely_roughness(pair, motion, inflation, &self.surface.noise, &self.surface.layout)
     }
 
-    /// Tries stones whose points leave their motion open at a distance, and follows each from the best place
-    /// found.
+    /// Tries stones at a distance, and follows each on its own from the best place found, where that is another.
     ///
     /// Cost: eight evaluations of these stones.
     pub fn probe<S: PairSource>(&mut self, points: &Points<S>) -> Result<(), AdjustError<S::Error>> {
-        for group in points.groups(|i| self.is_open(&self.stones[i])) {
-            let is_open = |i: usize| self.is_open(&self.stones[i]);
-            let found = points.of_stones(&group, is_open, |i, pair| self.probe_one(i, pair))?;
-            for (i, place) in found {
-                self.stones[i].on_own = place.map(CandidateMotion::new);
+        for group in points.groups(|i| self.may_be_elsewhere(&self.stones[i])) {
+            let may_be = |i: usize| self.may_be_elsewhere(&self.stones[i]);
+            let found = points.of_stones(&group, may_be, |i, pair| self.probe_one(i, pair))?;
+            for (i, place) in found.into_iter().filter_map(|(i, place)| Some((i, place?))) {
+                self.stones[i].on_own = Some(CandidateMotion::new(place));
             }
         }
         Ok(())
     }
 
-    /// Whether a stone is to be tried at a distance: usable, not yet followed on its own, and its motion
-    /// open.
-    fn is_open(&self, stone: &StoneState) -> bool {
+    /// Whether a stone is to be tried at a distance: usable, and its points leave its motion open, or it is followed on
+    /// its own already. What brought it away from the field may have been its motion out of the face alone, and the
+    /// place where it came to rest in the face a false optimum.
+    fn may_be_elsewhere(&self, stone: &StoneState) -> bool {
         let inflation = self.surface.inflation_of_all(stone.surface());
         let is_open = |e: &Equations| Probe::is_open(e, inflation, self.params.loose_move_m);
         stone.info.usable
-            && stone.on_own.is_none()
-            && stone.with_field.surface.equations().is_some_and(is_open)
+            && (stone.on_own.is_some() || stone.with_field.surface.equations().is_some_and(is_open))
     }
 
     fn probe_one(&self, i: usize, pair: &PairPoints) -> Option<StoneVector> {
         let stone = &self.stones[i];
+        let from = stone.on_own.as_ref().unwrap_or(&stone.with_field);
         let probe = Probe {
             pair: &self.local_pair(i, pair),
-            here: placed(&stone.with_field),
+            here: placed(from),
             surface: &self.surface,
             inflation: self.surface.inflation_of_all(stone.surface()),
             move_m: self.params.loose_move_m,
         };
-        probe.best(stone.with_field.surface.equations()?)
+        probe.best(from.surface.equations()?)
     }
 }
 
@@ -365,6 +365,28 @@ mod tests {
             covariance[(0, 0)].min(covariance[(1, 1)]).sqrt()
         };
         assert!(sd(20) > 0.05 && sd(21) < 0.001, "{} {}", sd(20), sd(21));
+    }
+
+    #[test]
+    fn a_stone_that_is_followed_on_its_own_is_tried_elsewhere_too() {
+        let truth = Vector3::new(0.006, 0.013, 0.0);
+        let moved = |k| if k == 20 { truth } else { Vector3::zeros() };
+        let noise = [0.001; 2];
+        let pairs = MemoryPairs::new(wall(5, noise, moved));
+        let (mut adjustment, points) = begun(&pairs);
+        adjustment.surface.noise.sigma_m = noise;
+        let mut error_from = |start: Vector3<f64>| {
+            let start = true_motion(&adjustment, 20, start);
+            adjustment.stones[20].on_own = Some(CandidateMotion::new(start));
+            adjustment.evaluate(&points).unwrap();
+            adjustment.probe(&points).unwrap();
+            let own = adjustment.stones[20].on_own.as_ref().unwrap().motion;
+            (own - true_motion(&adjustment, 20, truth)).translation().norm()
+        };
+        // Out of the face it is where it went, along the face it is not.
+        let error = error_from(Vector3::new(truth.x, 0.0, 0.0));
+        assert!(error < 0.005, "{error}");
+        assert_eq!(error_from(truth), 0.0);
     }
 
     #[test]

@@ -37,7 +37,7 @@ pub(crate) struct LeftOver {
 }
 
 impl LeftOver {
-    /// What counts of it: 1 up to the limit.
+    /// What counts of its residual: 1 up to the limit.
     fn share(&self) -> f64 {
         let covariance = self.information.try_inverse().unwrap_or_else(Matrix3::zeros);
         let squared = self.vector.dot(&(covariance * self.vector)).max(0.0);
@@ -104,7 +104,8 @@ fn loosened(
     };
     let mut weighed = problem.clone();
     for (stone, share) in weighed.stones.iter_mut().zip(shares) {
-        stone.p_with_field = *share;
+        // Its square: what a stone counts in the likelihood is then bounded as its residual is.
+        stone.p_with_field = share * share;
     }
     let part = Subgraph::of(graph, within(REACH))?;
     let problem = part.restrict(&weighed);
@@ -256,6 +257,22 @@ mod tests {
             Vector3::new(0.0, if is_it { 0.02 } else { 0.0 }, 0.0)
         };
         assert!(found(&wall(1, single)).is_none());
+    }
+
+    #[test]
+    fn two_loose_stones_beside_each_other_are_no_zone() {
+        let is_it = |column: f64, row: f64| row == 4.0 && (6.0..=7.0).contains(&column);
+        let mut wall = wall(1, |column, row| {
+            Vector3::new(0.0, 0.0, if is_it(column, row) { 0.02 } else { 0.0 })
+        });
+        // They are large: their points show five times as exactly as others' where they are.
+        for (k, equations) in wall.equations.iter_mut().enumerate() {
+            if is_it((k % COLUMNS) as f64, (k / COLUMNS) as f64) {
+                equations.information *= 25.0;
+                equations.vector *= 25.0;
+            }
+        }
+        assert!(found(&wall).is_none());
     }
 
     #[test]

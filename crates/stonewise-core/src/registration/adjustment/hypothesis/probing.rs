@@ -14,8 +14,9 @@ use std::f64::consts::TAU;
 /// Directions in the face in which a stone is tried, 45 degrees apart: neighbouring places are then nearer to
 /// each other than to where the stone was.
 const DIRECTIONS: usize = 8;
-/// A stone is probed if its points leave its motion in the face less certain than this share of what loose
-/// stones move: below it the equations at the field's motion reach as far as the stone can have gone.
+/// A stone that moves with the field is probed if its points leave its motion in the face less certain than this
+/// share of what loose stones move: below it the equations at the field's motion reach as far as the stone can have
+/// gone.
 const OPEN_SHARE: f64 = 0.1;
 
 /// A stone that is tried at a distance.
