@@ -161,7 +161,7 @@ impl Adjustment {
         likely_roughness(pair, motion, inflation, &self.surface.noise, &self.surface.layout)
     }
 
-    /// Tries stones at a distance, and follows each on its own from the best place found, where that is another.
+    /// Tries stones at a distance. Where another place fits better, a stone is followed on its own from there.
     ///
     /// Cost: eight evaluations of these stones.
     pub fn probe<S: PairSource>(&mut self, points: &Points<S>) -> Result<(), AdjustError<S::Error>> {
@@ -176,8 +176,8 @@ impl Adjustment {
     }
 
     /// Whether a stone is to be tried at a distance: usable, and its points leave its motion open, or it is followed on
-    /// its own already. What brought it away from the field may have been its motion out of the face alone, and the
-    /// place where it came to rest in the face a false optimum.
+    /// its own already. It may have left the field because it moved out of the face, and still be at a false
+    /// optimum in the face.
     fn may_be_elsewhere(&self, stone: &StoneState) -> bool {
         let inflation = self.surface.inflation_of_all(stone.surface());
         let is_open = |e: &Equations| Probe::is_open(e, inflation, self.params.loose_move_m);

@@ -37,7 +37,7 @@ pub(crate) struct LeftOver {
 }
 
 impl LeftOver {
-    /// What counts of its residual: 1 up to the limit.
+    /// Huber weight of its residual: 1 up to the limit, then the limit over the residual.
     fn share(&self) -> f64 {
         let covariance = self.information.try_inverse().unwrap_or_else(Matrix3::zeros);
         let squared = self.vector.dot(&(covariance * self.vector)).max(0.0);
@@ -104,7 +104,7 @@ fn loosened(
     };
     let mut weighed = problem.clone();
     for (stone, share) in weighed.stones.iter_mut().zip(shares) {
-        // Its square: what a stone counts in the likelihood is then bounded as its residual is.
+        // The square bounds what a stone adds to the gain of a zone.
         stone.p_with_field = share * share;
     }
     let part = Subgraph::of(graph, within(REACH))?;
@@ -265,7 +265,7 @@ mod tests {
         let mut wall = wall(1, |column, row| {
             Vector3::new(0.0, 0.0, if is_it(column, row) { 0.02 } else { 0.0 })
         });
-        // They are large: their points show five times as exactly as others' where they are.
+        // They are large: their standard deviation is a fifth of the others'.
         for (k, equations) in wall.equations.iter_mut().enumerate() {
             if is_it((k % COLUMNS) as f64, (k / COLUMNS) as f64) {
                 equations.information *= 25.0;
