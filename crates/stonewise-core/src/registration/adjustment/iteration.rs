@@ -139,9 +139,12 @@ impl<'r, 'a, S: PairSource> Evaluated<'r, 'a, S> {
         Ok(self)
     }
 
-    /// Tries stones far from the field's motion; the best place found is followed from then on.
-    pub fn probe(&mut self) -> Result<(), AdjustError<S::Error>> {
-        self.0.adjustment.probe(&self.0.points)
+    /// Tries stones far from the field's motion, and evaluates them at the best place found, from which they are
+    /// followed.
+    pub fn probe(self) -> Result<Self, AdjustError<S::Error>> {
+        self.0.adjustment.probe(&self.0.points)?;
+        self.0.adjustment.evaluate(&self.0.points)?;
+        Ok(self)
     }
 
     /// Adjusts the photos' poses, where photos take part.
@@ -190,5 +193,37 @@ impl<S: PairSource> Solved<'_, '_, S> {
         let is_at_rest = run.adjustment.step(&solution);
         run.last = Some(solution);
         is_at_rest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::survey::survey;
+    use super::super::testing::wall;
+    use super::*;
+    use crate::progress::Silent;
+    use crate::registration::points::MemoryPairs;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn a_stone_that_is_found_at_a_distance_is_followed_from_there() {
+        let (stone, noise) = (20, [0.005; 2]);
+        let far = Vector3::new(0.0, 0.015, 0.0);
+        let moved = |k| if k == stone { far } else { Vector3::zeros() };
+        let pairs = MemoryPairs::new(wall(5, noise, moved));
+        let params = AdjustmentParams::default();
+        let mut run = Run::new(survey(&pairs, &params, &Silent).unwrap(), &params).unwrap();
+        for _ in 0..3 {
+            let mut iteration = run.begin().unwrap();
+            iteration.estimate_noise();
+            iteration.evaluate().unwrap();
+        }
+        let probed = run.begin().unwrap().evaluate().unwrap().probe().unwrap();
+        probed.solve_and_reweight().unwrap().step();
+        let stone = stone as usize;
+        let own = run.adjustment.stones[stone].on_own.as_ref().unwrap().motion;
+        let there = run.adjustment.prior.graph.nodes[stone].face_from_world * far;
+        let error = (own.translation() - there).norm();
+        assert!(error < 0.005, "{error}");
     }
 }

@@ -78,8 +78,7 @@ impl<'a, S: PairSource> Aligned<'a, S> {
         if let Some(mut iteration) = run.begin() {
             iteration.estimate_noise();
             iteration.mark_roughness_due();
-            let mut evaluated = iteration.evaluate()?.restart()?;
-            evaluated.probe()?;
+            let evaluated = iteration.evaluate()?.restart()?.probe()?;
             evaluated.solve_and_reweight()?.step();
         }
         Ok(Probed(run))
