@@ -175,7 +175,7 @@ export interface Offer {
   readonly gain_interval?: readonly [number, number] | null;
   /** Whether the gain is more than chance. */
   readonly is_better: boolean;
-  /** Stones on the blocks kept apart. */
+  /** Stones in the blocks kept apart. */
   readonly kept: number;
   /** How long it was trained, minutes. */
   readonly minutes: number;
@@ -274,7 +274,7 @@ export interface RunShown {
   readonly steps: readonly (StepShown)[];
 }
 
-/** How well a detector finds stones. */
+/** How well the masks of a detector agree with the stones of the cloud. */
 export interface ScoreShown {
   /** Harmonic mean of both. */
   readonly f1?: number | null;

@@ -90,8 +90,8 @@ pub enum Command {
     Train(TrainArgs),
     /// Train the detector of a project on the stones of its own survey that several photos and the cloud confirm.
     ///
-    /// Parts of the wall are kept apart. Where the trained detector does not find their stones significantly better,
-    /// nothing changes.
+    /// Parts of the wall are kept apart. Unless the masks of the trained detector agree significantly better there from
+    /// photo to photo, nothing changes.
     #[command(after_help = "Example:\n  stonewise adapt survey/stonewise.toml --minutes 20")]
     Adapt(AdaptArgs),
     /// Transfer the labels of the photos to the point clouds.

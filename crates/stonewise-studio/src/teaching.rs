@@ -62,7 +62,7 @@ pub struct Offer {
     pub steps: u64,
     /// Masks of corrected stones and masks that are none, counted in each photo.
     pub corrected: usize,
-    /// Stones on the blocks kept apart.
+    /// Stones in the blocks kept apart.
     pub kept: usize,
     /// The detector that the project uses, on these blocks.
     pub before: ScoreShown,
@@ -76,7 +76,7 @@ pub struct Offer {
     pub changes: Vec<StoneChange>,
 }
 
-/// How well a detector finds stones.
+/// How well the masks of a detector agree with the stones of the cloud.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScoreShown {
     /// Share of what it found that is right; absent where it found nothing.

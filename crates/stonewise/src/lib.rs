@@ -40,7 +40,7 @@ use stonewise_figure as figure;
 use stonewise_project::sources;
 use stonewise_report::verdict;
 
-pub use adapt::{Adapted, Fate, StoneChange, Taught, adapt, keep_detector, teach};
+pub use adapt::{Adapted, Agreement, Fate, StoneChange, Taught, adapt, keep_detector, teach};
 pub use address_space::{require as require_memory, require_start};
 pub use error::{Error, Result};
 pub use files::read_toml;

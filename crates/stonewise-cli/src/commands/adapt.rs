@@ -37,7 +37,7 @@ pub fn adapt(args: &AdaptArgs, force: bool, printer: &Printer) -> Result<Outcome
         |[low, high]| format!("95 % interval {low:.3} to {high:.3}"),
     );
     printer.log(&format!(
-        "F1 on the stones kept apart: {} before, {} after {} ({:.1} minutes); gain {:.3}, {interval}",
+        "F1 in the parts of the wall kept apart: {} before, {} after {} ({:.1} minutes); gain {:.3}, {interval}",
         f1(adapted.before.f1),
         f1(adapted.after.f1),
         counted(adapted.steps, "step"),

@@ -20,7 +20,7 @@ pub use error::TrainError;
 pub use optimizer::{AdamW, AdamWParams};
 pub use params::{TrainConfig, TrainParams};
 pub use rendered::Rendered;
-pub use run::{Run, Stop, evaluate_samples, model_path, pair_samples};
+pub use run::{Run, Stop, evaluate_samples, model_path};
 pub use schedule::{Elapsed, Schedule, Total};
 pub use source::SampleSource;
 pub use start::{Start, open_training};

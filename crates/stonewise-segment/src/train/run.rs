@@ -144,24 +144,13 @@ pub fn evaluate_samples<D: Detector>(
     detector: &D,
     samples: &[Sample],
 ) -> Result<MaskScore, TilingError<D::Error>> {
-    Ok(MaskScore::of(&pair_samples(detector, samples, &Silent)?))
-}
-
-/// The stones that a detector finds in images that it sees as a whole; `progress` advances by one for each.
-///
-/// # Errors
-/// The detector could not run, or the caller stopped it.
-pub fn pair_samples<D: Detector>(
-    detector: &D,
-    samples: &[Sample],
-    progress: &dyn Progress,
-) -> Result<Vec<PhotoPairs>, TilingError<D::Error>> {
     let pairs = samples.iter().map(|sample| {
         let options = TilingOptions::whole(sample.image());
-        let found = segment_photo(detector, sample.image(), sample.relief(), &options, progress)?;
+        let found = segment_photo(detector, sample.image(), sample.relief(), &options, &Silent)?;
         Ok(pair_masks(&found, sample.labels(), sample.ignore()))
     });
-    pairs.collect()
+    let pairs: Vec<PhotoPairs> = pairs.collect::<Result<_, TilingError<D::Error>>>()?;
+    Ok(MaskScore::of(&pairs))
 }
 
 /// Where a training leaves its detector.

@@ -1,20 +1,22 @@
-//! What a survey teaches: masks that several photos and the cloud agree on, and stones that a person corrected.
+//! What a survey teaches: masks that several photos and the cloud agree on, stones that a person corrected, and panels,
+//! which are background.
 
+use super::sight::{LEAST_PIXELS, Sight, confirmed, matches, owners, panels};
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::{Labelled, Run, Segmented};
 use crate::project::Project;
 use crate::storage::step::{Key, StepDir};
+use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::View;
-use stonewise_core::id::{ImageId, StoneId};
+use stonewise_core::id::StoneId;
 use stonewise_core::raster::{LabelImage, Raster};
 use stonewise_core::stone::Stone;
-use stonewise_core::transfer::{PhotoStones, photo_stones};
 use stonewise_io::masks::write_label_png;
 
 const STEP: &str = "lesson";
@@ -22,24 +24,14 @@ const STEP: &str = "lesson";
 const PHOTOS: &str = "photos.json";
 /// Value of the pixels about which nothing is known, in the label image of a photo.
 pub const OPEN: u32 = u16::MAX as u32;
-/// Photos whose masks make up a stone that is confirmed, at least.
-const LEAST_PHOTOS: usize = 2;
-/// Share of the votes on its points that agree, at least.
-const LEAST_CONFIDENCE: f64 = 0.75;
-/// Overlap (intersection over union) of a mask with its stone in the cloud from which it is taught.
-const LEAST_OVERLAP: f64 = 0.7;
-/// Pixels of a stone that is taught, at least: below, the detector cannot find it either.
-const LEAST_PIXELS: u64 = 100;
-/// A stone so near to the border of a photo may be cut, pixels.
-const MARGIN: u32 = 3;
 /// Share of a stone that masks of others may cover in a photo that has no mask of it.
 const MAX_FOREIGN: f64 = 0.1;
 /// Width of the ring around the masks in which joints are taught, in parts of the width of a typical stone.
 const RING: f64 = 0.1;
 /// Share of the blocks of the wall that are kept for measuring.
-const KEPT_SHARE: f64 = 0.15;
+const KEPT_SHARE: f64 = 0.2;
 /// Edge of a block, in widths of a typical stone.
-const BLOCK_STONES: f64 = 4.0;
+const BLOCK_STONES: f64 = 2.5;
 /// Confirmed stones from which anything can be learnt and measured.
 const LEAST_STONES: usize = 20;
 
@@ -47,10 +39,12 @@ const LEAST_STONES: usize = 20;
 pub struct Lesson {
     /// The photos that show a confirmed stone.
     pub photos: Vec<LessonPhoto>,
-    /// The block of the wall in which each confirmed stone lies; the first stone has the label 1.
-    pub blocks: Vec<[i64; 3]>,
-    /// Labels of the stones that are kept for measuring.
+    /// How many stones are confirmed or corrected.
+    pub stones: usize,
+    /// Labels of the stones that are kept for measuring; labels start at 1.
     pub kept: BTreeSet<u32>,
+    /// The parts of the wall in which the kept stones lie.
+    pub parts: Parts,
     /// Key of everything above.
     pub key: Key,
 }
@@ -61,7 +55,7 @@ pub struct LessonPhoto {
     pub path: PathBuf,
     /// Its camera.
     pub view: View,
-    /// Its epoch.
+    /// The stones of its epoch.
     pub epoch: Arc<Labelled>,
     /// Its label image: 1 for the first of `stones`, 0 for joints, [`OPEN`] where nothing is known.
     pub image: PathBuf,
@@ -85,11 +79,26 @@ impl Lesson {
         let chosen: Vec<usize> = all.clone().filter(|&n| teaches(&self.photos[n])).collect();
         if chosen.is_empty() { all.collect() } else { chosen }
     }
+}
 
-    /// The block in which the stone of a label lies.
-    pub fn block(&self, label: u32) -> Option<[i64; 3]> {
-        self.blocks.get((label as usize).checked_sub(1)?).copied()
+/// The block of the wall in which a place lies.
+pub type Block = [i64; 3];
+
+/// The parts of the wall that are kept for measuring.
+pub struct Parts {
+    edge_m: f64,
+    kept: BTreeSet<Block>,
+}
+
+impl Parts {
+    /// The part in which a place lies; `None` where it is not kept for measuring.
+    pub fn of(&self, place: &Point3<f64>) -> Option<Block> {
+        Some(block(self.edge_m, place)).filter(|block| self.kept.contains(block))
     }
+}
+
+fn block(edge_m: f64, place: &Point3<f64>) -> Block {
+    place.coords.map(|x| (x / edge_m).floor() as i64).into()
 }
 
 /// What is kept of a photo.
@@ -122,10 +131,7 @@ pub fn lesson(run: &Run) -> Result<Lesson> {
         .filter(|&e| project.epochs[e].masks.is_none())
     {
         let segmented = run.segmented(epoch)?;
-        let (labelled, before) = match &project.edits {
-            Some(_) => (run.labelled(epoch)?, Some(run.confirmed(epoch)?)),
-            None => (run.found(epoch)?, None),
-        };
+        let (labelled, before) = stones_of(run, epoch)?;
         let step = teach(run, epoch, (&labelled, before.as_deref()), &segmented)?;
         let of_id: BTreeMap<StoneId, &Stone> = labelled.stones.iter().map(|s| (s.id, s)).collect();
         let mut labels: BTreeMap<StoneId, u32> = BTreeMap::new();
@@ -176,11 +182,12 @@ pub fn lesson(run: &Run) -> Result<Lesson> {
         ));
     }
 
-    let blocks = blocks(&confirmed);
+    let edge_m = edge_m(&confirmed);
+    let blocks: Vec<Block> = confirmed.iter().map(|s| block(edge_m, &s.centroid)).collect();
     let labels = (1..).zip(&blocks);
     // Corrections are few: most of them are to be learnt from.
     let of_person = labels.clone().filter(|(label, _)| corrected.contains(label));
-    let of_person: BTreeSet<[i64; 3]> = of_person.map(|(_, block)| *block).collect();
+    let of_person: BTreeSet<Block> = of_person.map(|(_, block)| *block).collect();
     let others = blocks.iter().copied().filter(|block| !of_person.contains(block));
     let mut kept_blocks = chosen_blocks(others.collect(), 2);
     kept_blocks.extend(chosen_blocks(of_person, 0));
@@ -193,7 +200,19 @@ pub fn lesson(run: &Run) -> Result<Lesson> {
         kept: kept.collect(),
         key: Key::new(STEP, &(), &keys),
         photos,
-        blocks,
+        stones: confirmed.len(),
+        parts: Parts {
+            edge_m,
+            kept: kept_blocks,
+        },
+    })
+}
+
+/// The stones of an epoch, and those before a person's corrections if the project has any.
+pub fn stones_of(run: &Run, epoch: EpochId) -> Result<(Arc<Labelled>, Option<Arc<Labelled>>)> {
+    Ok(match &run.context.project.edits {
+        Some(_) => (run.labelled(epoch)?, Some(run.confirmed(epoch)?)),
+        None => (run.found(epoch)?, None),
     })
 }
 
@@ -204,20 +223,18 @@ fn refused(project: &Project, why: &str) -> Error {
     ))
 }
 
-/// The block of the wall in which each stone lies.
-fn blocks(stones: &[Stone]) -> Vec<[i64; 3]> {
+/// Edge of a block, metres.
+fn edge_m(stones: &[Stone]) -> f64 {
     let mut areas: Vec<f64> = stones.iter().map(|s| s.area_m2).collect();
     areas.sort_by(f64::total_cmp);
     let typical = areas.get(areas.len() / 2).map_or(1.0, |area| area.sqrt());
-    let edge = BLOCK_STONES * typical.max(f64::MIN_POSITIVE);
-    let block = |s: &Stone| s.centroid.coords.map(|x| (x / edge).floor() as i64).into();
-    stones.iter().map(block).collect()
+    BLOCK_STONES * typical.max(f64::MIN_POSITIVE)
 }
 
 /// Blocks chosen by their place alone, `least` of them at least where there are more.
-fn chosen_blocks(all: BTreeSet<[i64; 3]>, least: usize) -> BTreeSet<[i64; 3]> {
-    let mut order: Vec<[i64; 3]> = all.into_iter().collect();
-    let rank = |block: &[i64; 3]| blake3::hash(format!("{block:?}").as_bytes());
+fn chosen_blocks(all: BTreeSet<Block>, least: usize) -> BTreeSet<Block> {
+    let mut order: Vec<Block> = all.into_iter().collect();
+    let rank = |block: &Block| blake3::hash(format!("{block:?}").as_bytes());
     order.sort_by_cached_key(|block| *rank(block).as_bytes());
     let count = (order.len() as f64 * KEPT_SHARE).round() as usize;
     order.truncate(count.max(least).min(order.len().saturating_sub(1)));
@@ -233,29 +250,24 @@ fn teach(
     segmented: &Segmented,
 ) -> Result<StepDir> {
     let context = run.context;
+    let panels = panels(run, epoch, labelled)?;
     let key = Key::new(STEP, &(), &[labelled.key.as_str(), segmented.step.key().as_str()]);
     context.step(&format!("{STEP}-{epoch}"), key, |step, _| {
         let corrected: BTreeSet<StoneId> = labelled.edited.keys().copied().collect();
-        let confirmed = confirmed(labelled);
+        let confirmed = &confirmed(labelled) - &panels;
         let mut photos = Vec::new();
         context.progress.begin("photos", segmented.views.len() as u64);
         for (photo, view) in segmented.views.iter().enumerate() {
-            let masks = segmented.labels(view.image)?;
-            let tiles = &labelled.ingested.tiles.surveyed;
-            let labels = |tile| labelled.labels(tile);
-            let params = &context.project.settings.label;
-            let cloud = photo_stones(tiles, labels, view, params, context.progress)?;
-            let owners = owners(labelled, view.image);
-            let had = before.map_or(BTreeMap::new(), |before| self::owners(before, view.image));
+            let sight = Sight::of(run, labelled, segmented, view)?;
+            let had = before.map_or(BTreeMap::new(), |before| owners(before, view.image));
             let deleted = had
                 .into_keys()
-                .filter(|instance| !owners.contains_key(instance))
+                .filter(|instance| !sight.owners.contains_key(instance))
                 .collect();
             let shown = Shown {
-                masks: &masks,
-                cloud: &cloud,
-                owners: &owners,
+                sight: &sight,
                 deleted: &deleted,
+                panels: &panels,
             };
             let chosen = shown.choose(&confirmed, &corrected);
             if !chosen.is_empty() {
@@ -278,35 +290,6 @@ fn image_name(photo: usize) -> String {
     format!("{photo:05}.png")
 }
 
-/// The stones that photos agree on.
-fn confirmed(labelled: &Labelled) -> BTreeSet<StoneId> {
-    let sure = labelled
-        .stones
-        .iter()
-        .filter(|s| s.confidence >= LEAST_CONFIDENCE);
-    let sure: BTreeSet<StoneId> = sure.map(|s| s.id).collect();
-    let stones = labelled.transfer.stones.iter();
-    let in_photos = stones.filter(|s| {
-        let photos: BTreeSet<ImageId> = s.instances.iter().map(|(photo, _)| *photo).collect();
-        photos.len() >= LEAST_PHOTOS
-    });
-    in_photos.map(|s| s.stone).filter(|s| sure.contains(s)).collect()
-}
-
-/// The stone to which each instance of a photo belongs.
-fn owners(labelled: &Labelled, photo: ImageId) -> BTreeMap<u32, StoneId> {
-    let stones = labelled.transfer.stones.iter();
-    let instances = stones.flat_map(|s| {
-        s.instances
-            .iter()
-            .map(|(image, instance)| (image, instance.0, s.stone))
-    });
-    instances
-        .filter(|(image, ..)| **image == photo)
-        .map(|(_, instance, stone)| (instance, stone))
-        .collect()
-}
-
 /// How a stone is taught in a photo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum How {
@@ -318,34 +301,20 @@ enum How {
     Corrected,
 }
 
-/// A photo with its masks and what the cloud says of it.
+/// A photo and what decides which of its pixels are taught.
 struct Shown<'a> {
-    masks: &'a LabelImage,
-    cloud: &'a PhotoStones,
-    owners: &'a BTreeMap<u32, StoneId>,
+    sight: &'a Sight,
     /// Masks that a person said are no stones.
     deleted: &'a BTreeSet<u32>,
-}
-
-/// Pixels of a stone in a photo, where the cloud says anything.
-#[derive(Clone, Copy, Debug, Default)]
-struct Pixels {
-    /// Pixels of the stone in the cloud.
-    cloud: u64,
-    /// Pixels of its masks.
-    mask: u64,
-    /// Pixels of both.
-    both: u64,
-    /// Pixels of the stone in the cloud, under the masks of others.
-    foreign: u64,
-    /// Whether the stone reaches the border of the photo.
-    is_cut: bool,
+    /// Panels of doors and the like, which are no stones.
+    panels: &'a BTreeSet<StoneId>,
 }
 
 impl Shown<'_> {
     /// The confirmed and the corrected stones that the photo can teach.
     fn choose(&self, confirmed: &BTreeSet<StoneId>, corrected: &BTreeSet<StoneId>) -> BTreeMap<StoneId, How> {
         let all = self
+            .sight
             .pixels()
             .into_iter()
             .filter(|(stone, _)| confirmed.contains(stone) || corrected.contains(stone));
@@ -355,7 +324,7 @@ impl Shown<'_> {
                 _ if corrected.contains(&stone) => How::Corrected,
                 0 if !n.is_cut && n.foreign as f64 <= MAX_FOREIGN * n.cloud as f64 => How::Missed,
                 0 => return None,
-                _ if n.both as f64 >= LEAST_OVERLAP * (n.cloud + n.mask - n.both) as f64 => How::Found,
+                _ if matches(n.both, n.cloud, n.mask) => How::Found,
                 _ => return None,
             };
             (n.cloud >= LEAST_PIXELS).then_some((stone, how))
@@ -364,40 +333,21 @@ impl Shown<'_> {
         chosen.take(OPEN as usize - 1).collect()
     }
 
-    fn pixels(&self) -> BTreeMap<StoneId, Pixels> {
-        let mut pixels: BTreeMap<StoneId, Pixels> = BTreeMap::new();
-        let (width, height) = (self.masks.width(), self.masks.height());
-        for index in (0..self.masks.data().len()).filter(|&i| self.cloud.known.data()[i]) {
-            let (mask, owner) = self.mask(index);
-            let seen = self.stone(index);
-            if let Some(owner) = owner {
-                pixels.entry(owner).or_default().mask += 1;
-            }
-            let Some(seen) = seen else { continue };
-            let (x, y) = (index as u32 % width, index as u32 / width);
-            let stone = pixels.entry(seen).or_default();
-            stone.cloud += 1;
-            stone.both += u64::from(owner == Some(seen));
-            stone.foreign += u64::from(mask != 0 && owner != Some(seen));
-            stone.is_cut |= x < MARGIN || y < MARGIN || x + MARGIN >= width || y + MARGIN >= height;
-        }
-        pixels
-    }
-
-    /// The label image: the chosen stones by their place, 0 in the joints around them and where a person deleted
-    /// a stone, [`OPEN`] elsewhere.
+    /// The label image: the chosen stones by their place, 0 in the joints around them, in panels and where a person
+    /// deleted a stone, [`OPEN`] elsewhere.
     fn drawn(&self, chosen: &BTreeMap<StoneId, How>) -> LabelImage {
         let values: BTreeMap<StoneId, (u32, How)> = (1..)
             .zip(chosen)
             .map(|(value, (&stone, &how))| (stone, (value, how)))
             .collect();
-        let (width, height) = (self.masks.width(), self.masks.height());
+        let sight = self.sight;
+        let (width, height) = (sight.masks.width(), sight.masks.height());
         let mut drawn = Raster::filled(width, height, OPEN);
         let mut is_stone = Raster::filled(width, height, false);
 
         for (index, value) in drawn.data_mut().iter_mut().enumerate() {
-            let by_mask = self.mask(index).1.and_then(|stone| values.get(&stone));
-            let by_cloud = self.stone(index).and_then(|stone| values.get(&stone));
+            let by_mask = sight.mask(index).1.and_then(|stone| values.get(&stone));
+            let by_cloud = sight.stone(index).and_then(|stone| values.get(&stone));
             let found = by_mask.filter(|(_, how)| *how == How::Found);
             let seen = by_cloud.filter(|(_, how)| *how == How::Missed);
             let corrected = by_cloud.filter(|(_, how)| *how == How::Corrected);
@@ -412,28 +362,18 @@ impl Shown<'_> {
         let near = grown(&is_stone, (RING * typical).ceil() as usize);
 
         for (index, value) in drawn.data_mut().iter_mut().enumerate() {
-            let is_no_stone = self.cloud.known.data()[index] && self.stone(index).is_none();
-            let mask = self.mask(index).0;
+            let (mask, owner) = sight.mask(index);
+            let seen = sight.stone(index);
             let is_joint = mask == 0 && near.data()[index];
-            if *value == OPEN && is_no_stone && (is_joint || self.deleted.contains(&mask)) {
+            let is_between = sight.cloud.known.data()[index] && seen.is_none();
+            let is_no_stone = is_between && (is_joint || self.deleted.contains(&mask))
+                || owner.or(seen).is_some_and(|stone| self.panels.contains(&stone));
+            if *value == OPEN && is_no_stone {
                 *value = 0;
             }
         }
 
         drawn
-    }
-
-    /// The instance of a pixel, and the stone to which it belongs.
-    fn mask(&self, index: usize) -> (u32, Option<StoneId>) {
-        let instance = self.masks.data()[index];
-        (instance, self.owners.get(&instance).copied())
-    }
-
-    /// The stone that the cloud shows in a pixel.
-    fn stone(&self, index: usize) -> Option<StoneId> {
-        Some(self.cloud.stones.data()[index])
-            .filter(|&stone| stone != 0)
-            .map(StoneId)
     }
 }
 
@@ -463,26 +403,13 @@ fn grown(set: &Raster<bool>, reach: usize) -> Raster<bool> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::{enlarged, labels};
     use super::*;
     use rand::{RngExt, SeedableRng};
-
-    /// Rows of pixels: digits are labels, spaces have none.
-    fn labels(rows: [&str; 8]) -> LabelImage {
-        let values = rows
-            .iter()
-            .flat_map(|row| row.chars().map(|c| c.to_digit(10).unwrap_or(0)));
-        Raster::from_vec(rows[0].len() as u32, 8, values.collect()).unwrap()
-    }
-
-    /// Each pixel of a row ten times in both directions.
-    fn enlarged<T: Copy>(small: &Raster<T>) -> Raster<T> {
-        let (width, height) = (10 * small.width(), 10 * small.height());
-        let at = |i: u32| *small.get(i % width / 10, i / width / 10).unwrap();
-        Raster::from_vec(width, height, (0..width * height).map(at).collect()).unwrap()
-    }
+    use stonewise_core::transfer::PhotoStones;
 
     /// A photo with stone 1 as found, 2 that the detector missed, 3 whose mask covers half of it, 4 that it
-    /// missed at the border of the photo, 5 that lies under the mask of another, 6 that is not confirmed.
+    /// missed at the border of the photo, 5 that lies under the mask of another, and 6, a panel of a door.
     #[test]
     fn a_photo_teaches_what_mask_and_cloud_agree_on_and_what_was_missed() {
         let cloud = labels([
@@ -496,10 +423,10 @@ mod tests {
             " 44                 ",
         ]);
         let masks = labels([
-            "                    ",
+            "                 222",
             " 777      88999  222",
             " 777      88999  222",
-            " 777      88999  222",
+            " 777      88999     ",
             "                    ",
             "                    ",
             "                    ",
@@ -511,12 +438,15 @@ mod tests {
         let mut known = Raster::filled(200, 80, true);
         // Beyond the last rows the cloud has no points.
         known.data_mut()[200 * 50..200 * 60].fill(false);
-        let cloud = PhotoStones { stones: cloud, known };
+        let sight = Sight {
+            masks,
+            cloud: PhotoStones { stones: cloud, known },
+            owners,
+        };
         let shown = Shown {
-            masks: &masks,
-            cloud: &cloud,
-            owners: &owners,
+            sight: &sight,
             deleted: &BTreeSet::new(),
+            panels: &[StoneId(6)].into(),
         };
         let confirmed = (1..=5).map(StoneId).collect();
         let chosen = shown.choose(&confirmed, &BTreeSet::new());
@@ -527,7 +457,9 @@ mod tests {
         // The two stones, the joint between them, what is far from both, and what is open.
         assert_eq!([at(25, 25), at(65, 25)], [1, 2]);
         assert_eq!([at(41, 25), at(48, 25)], [0, 0]);
-        assert_eq!([at(45, 75), at(115, 25), at(145, 25), at(185, 25)], [OPEN; 4]);
+        assert_eq!([at(45, 75), at(115, 25), at(145, 25)], [OPEN; 3]);
+        // The panel, by its mask and by the cloud.
+        assert_eq!([at(185, 5), at(185, 25), at(185, 35)], [0, 0, 0]);
         assert_eq!(drawn.data().iter().filter(|v| **v == 1 || **v == 2).count(), 1800);
     }
 
@@ -557,15 +489,18 @@ mod tests {
         ]);
         let owners = [(7, 1), (8, 1), (9, 2), (6, 3)].map(|(mask, stone)| (mask, StoneId(stone)));
         let (cloud, masks) = (enlarged(&cloud), enlarged(&masks));
-        let cloud = PhotoStones {
-            stones: cloud,
-            known: Raster::filled(200, 80, true),
+        let sight = Sight {
+            masks,
+            cloud: PhotoStones {
+                stones: cloud,
+                known: Raster::filled(200, 80, true),
+            },
+            owners: owners.into(),
         };
         let shown = Shown {
-            masks: &masks,
-            cloud: &cloud,
-            owners: &owners.into(),
+            sight: &sight,
             deleted: &[5].into(),
+            panels: &BTreeSet::new(),
         };
         let chosen = shown.choose(&BTreeSet::new(), &[1, 2].map(StoneId).into());
         let expected = [1, 2].map(|stone| (StoneId(stone), How::Corrected));
@@ -597,11 +532,11 @@ mod tests {
     #[test]
     fn some_blocks_are_kept_and_never_all() {
         let chosen = |count: i64, least| chosen_blocks((0..count).map(|i| [i, 0, 0]).collect(), least);
-        assert_eq!(chosen(100, 2).len(), 15);
+        assert_eq!(chosen(100, 2).len(), 20);
         assert_eq!(chosen(5, 2).len(), 2);
         assert_eq!(chosen(2, 2).len(), 1);
         assert!(chosen(1, 2).is_empty());
         // Of a few blocks that a person corrected, none.
-        assert_eq!([1, 3, 7, 20].map(|count| chosen(count, 0).len()), [0, 0, 1, 3]);
+        assert_eq!([1, 2, 7, 20].map(|count| chosen(count, 0).len()), [0, 0, 1, 4]);
     }
 }

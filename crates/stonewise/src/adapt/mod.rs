@@ -5,10 +5,14 @@
 //! nothing changes. Self-training (Scudder 1965), with photos and cloud as judges of each other. Where a person
 //! corrected stones, these are taught as they were corrected.
 
+mod agreement;
 mod changes;
 mod gain;
 mod lesson;
+mod sight;
 mod survey_photos;
+#[cfg(test)]
+mod testing;
 
 use crate::error::Result;
 use crate::files::write_readable_json;
@@ -19,8 +23,10 @@ use crate::results::Facade;
 use crate::results::names::WORK_DIR;
 use crate::segmentation::train_for;
 use crate::storage::store::{Keeps, StepStore};
+pub use agreement::Agreement;
+use agreement::agreement;
 pub use changes::{Fate, StoneChange};
-use gain::Gain;
+use gain::{Gain, both, sum};
 use lesson::lesson;
 use serde::Serialize;
 use std::fs;
@@ -29,10 +35,9 @@ use std::sync::Arc;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::progress::Progress;
 use stonewise_io::atomic::write_atomically;
+use stonewise_segment::Weights;
 use stonewise_segment::dataset::PhotoCrops;
-use stonewise_segment::evaluation::{MaskScore, PhotoPairs};
-use stonewise_segment::train::{Start, TrainParams, model_path, pair_samples};
-use stonewise_segment::{StoneFinder, Weights};
+use stonewise_segment::train::{Start, TrainParams, model_path};
 use survey_photos::SurveyPhotos;
 
 /// What was decided, in the output folder.
@@ -70,10 +75,10 @@ pub struct Adapted {
     pub minutes: f64,
     /// The detector at the start.
     pub from: PathBuf,
-    /// Its figures on the stones that were kept.
-    pub before: MaskScore,
-    /// Score of the trained detector.
-    pub after: MaskScore,
+    /// Agreement of its masks in the parts of the wall that were kept.
+    pub before: Agreement,
+    /// Agreement of the masks of the trained detector.
+    pub after: Agreement,
     /// Change of F1.
     pub gain: f64,
     /// Its 95 % interval, by a bootstrap over parts of the wall; absent where there are fewer than two.
@@ -86,8 +91,10 @@ pub struct Adapted {
 /// writes into the folder `out`:
 ///
 /// - `adapt.json`: what was taught, the figures before and after, and the decision,
-/// - `model.safetensors`: the detector, if it finds the stones that were kept apart significantly better,
+/// - `model.safetensors`: the detector, if its masks agree significantly better in the parts kept apart,
 /// - `work`, `training`: steps and checkpoint, with which an interrupted call continues.
+///
+/// Cost: the training, and both detectors on all photos of epochs without masks.
 ///
 /// # Errors
 /// Every epoch has masks, too few stones are confirmed, an input cannot be used, the training diverges, or the
@@ -98,7 +105,8 @@ pub fn adapt(
     out: &OutputFolder,
     progress: &dyn Progress,
 ) -> Result<Adapted> {
-    let context = Context::new(project, out, progress)?;
+    let store = every_step(out)?;
+    let context = Context::with_store(project, out.path(), store, progress)?;
     let run = Run::new(&context, Until::Labelled);
     let (mut adapted, trained) = learn(&run, minutes, &out.path().join(TRAINING), &|_| {})?;
     if adapted.is_better() {
@@ -119,6 +127,12 @@ pub struct Taught {
     pub changes: Vec<StoneChange>,
 }
 
+/// A store that keeps the steps of several detectors side by side.
+fn every_step(out: &OutputFolder) -> Result<Arc<StepStore>> {
+    let store = StepStore::new(&out.path().join(WORK_DIR), Keeps::Every)?;
+    Ok(Arc::new(store))
+}
+
 /// Trains as [`adapt`], with the steps of a run in `results`, and finds out what the trained detector would change
 /// there. Checkpoint and detector go into a folder in `training`; nothing else is changed, and an interrupted call
 /// continues. Runs with the trained detector take over what was found out. `wall`: the unrolled wall of the changes.
@@ -135,15 +149,13 @@ pub fn teach(
     progress: &dyn Progress,
 ) -> Result<Taught> {
     progress.agenda(&TEACHING.map(str::to_owned));
-    // Beside the steps of the results, which stay as they are.
-    let store = Arc::new(StepStore::new(&results.path().join(WORK_DIR), Keeps::Every)?);
+    let store = every_step(results)?;
     let context = |project| Context::with_store(project, results.path(), Arc::clone(&store), progress);
     let now = context(project)?;
     let run = Run::new(&now, Until::Labelled);
     let (adapted, model) = learn(&run, minutes, training, &|step| progress.enter(step))?;
     progress.enter(TEACHING.len() - 1);
-    let mut with_it = project.clone();
-    with_it.settings.segment.model.clone_from(&model);
+    let with_it = with_detector(project, &model);
     let then = context(&with_it)?;
     let other = Run::new(&then, Until::Labelled);
     let first = [
@@ -172,20 +184,18 @@ fn learn(run: &Run, minutes: f64, training: &Path, at: &dyn Fn(usize)) -> Result
         checkpoint_minutes: 1.0,
         ..TrainParams::fine_tuning()
     };
-    let photos = |which| SurveyPhotos::new(&lesson, which, trained_as.relief, &project.settings.label);
-    let (learnt, all) = (
-        photos(lesson.to_learn_from()),
-        photos((0..lesson.photos.len()).collect()),
+    let photos = SurveyPhotos::new(
+        &lesson,
+        lesson.to_learn_from(),
+        trained_as.relief,
+        &project.settings.label,
     );
-
-    let [crops, measured] = [&learnt, &all].map(|photos| {
-        PhotoCrops::new(
-            photos,
-            trained_as.augment.clone(),
-            trained_as.crop_px,
-            trained_as.seed,
-        )
-    });
+    let crops = PhotoCrops::new(
+        &photos,
+        trained_as.augment.clone(),
+        trained_as.crop_px,
+        trained_as.seed,
+    );
     let folder = training.join(&lesson.key.as_str()[..FOLDER_DIGITS]);
     let start = Start::Weights(from.clone());
     let no_images = || Ok(Vec::new());
@@ -200,18 +210,21 @@ fn learn(run: &Run, minutes: f64, training: &Path, at: &dyn Fn(usize)) -> Result
     )?;
 
     at(2);
-    let kept = measured.validation()?;
     let model = model_path(&folder);
-    let found = |weights: &Weights| -> Result<Vec<PhotoPairs>> {
-        let detector = StoneFinder::open(weights, params.tiling.min_score as f32)?;
-        progress.begin("measuring", kept.len() as u64);
-        Ok(pair_samples(&detector, &kept, progress)?)
-    };
-    let (before, after) = (found(&from)?, found(&Weights::File(model.clone()))?);
-    let gain = Gain::of(&before, &after, |label| lesson.block(label));
+    let with_it = with_detector(project, &model);
+    let then = Context::with_store(
+        &with_it,
+        &run.context.out,
+        Arc::clone(&run.context.store),
+        progress,
+    )?;
+    let other = Run::new(&then, Until::Labelled);
+    let parts = both(&agreement(run, &lesson)?, &agreement(&other, &lesson)?);
+    let [before, after] = sum(&parts);
+    let gain = Gain::of(&parts);
     let adapted = Adapted {
         photos: lesson.photos.len(),
-        stones: lesson.blocks.len(),
+        stones: lesson.stones,
         kept: lesson.kept.len(),
         masks: lesson.photos.iter().map(|p| p.stones.len()).sum(),
         missed: lesson.photos.iter().map(|p| p.missed).sum(),
@@ -219,14 +232,21 @@ fn learn(run: &Run, minutes: f64, training: &Path, at: &dyn Fn(usize)) -> Result
         steps: elapsed.steps,
         minutes: elapsed.seconds / 60.0,
         from: params.model.clone(),
-        before: MaskScore::of(&before),
-        after: MaskScore::of(&after),
+        before: before.into(),
+        after: after.into(),
         gain: gain.mean,
         gain_interval: gain.interval,
         model: None,
     };
 
     Ok((adapted, model))
+}
+
+/// The project with another detector.
+fn with_detector(project: &Project, model: &Path) -> Project {
+    let mut project = project.clone();
+    project.settings.segment.model = model.to_owned();
+    project
 }
 
 impl Adapted {

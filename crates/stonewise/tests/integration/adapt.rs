@@ -45,10 +45,15 @@ fn adapted(project: &Project, out: &Path, minutes: f64) -> stonewise::Result<Ada
     adapt(project, minutes, &folder, &Silent)
 }
 
+/// The folders in another: of a step, one for each detector.
+fn folders(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
+    entries.filter(|p| p.is_dir()).collect()
+}
+
 /// The only folder in another.
 fn only(folder: &Path) -> PathBuf {
-    let entries = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
-    let folders: Vec<PathBuf> = entries.filter(|p| p.is_dir()).collect();
+    let folders = folders(folder);
     assert_eq!(folders.len(), 1, "{folders:?}");
     folders[0].clone()
 }
@@ -59,7 +64,7 @@ fn json(path: &Path) -> Value {
 
 /// Overlap (intersection over union) of each mask that an epoch teaches with the true stone that it covers most.
 fn overlaps(work: &Path, epoch: usize, truth: &MaskSource) -> Vec<f64> {
-    let photos = json(&only(&work.join(format!("segment-{epoch}"))).join("photos.json"));
+    let photos = json(&folders(&work.join(format!("segment-{epoch}")))[0].join("photos.json"));
     let lesson = only(&work.join(format!("lesson-{epoch}")));
     let mut all = Vec::new();
     for taught in json(&lesson.join("photos.json")).as_array().unwrap() {

@@ -5,6 +5,7 @@ use crate::files::{read_json, write_json};
 use crate::pipeline::cost::Cost;
 use crate::pipeline::graph::{Need, Run, Step};
 use crate::pipeline::steps::edit::EDIT;
+use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::until::Until;
 use crate::storage::step::Key;
 use std::sync::Arc;
@@ -32,22 +33,27 @@ impl Run<'_> {
     /// The panels among the stones of the reference, ascending, but for stones that a person edited.
     pub fn panels(&self) -> Result<Arc<Vec<StoneId>>> {
         self.once(&PANELS, EpochId::REFERENCE, || {
-            let first = self.labelled(EpochId::REFERENCE)?;
-            let key = Key::new(STEP, &(), &[first.key.as_str()]);
-            let step = self.context.step(STEP, key, |step, _| {
-                let mut reliefs = StoneReliefs::new(&first.stones);
-                for tile in 0..first.ingested.tiles.tile_count() {
-                    self.context.progress.check()?;
-                    let (cloud, labels) = (first.ingested.tiles.load(tile)?, first.labels(tile)?);
-                    for (i, stone) in labels.stone.iter().enumerate().filter(|(_, stone)| **stone != 0) {
-                        reliefs.add(*stone, &cloud.world(i));
-                    }
-                }
-                write_json(&step.file(FILE), &panels(&first.stones, &reliefs))
-            })?;
-            let mut found: Vec<StoneId> = read_json(&step.file(FILE))?;
-            found.retain(|id| !first.edited.contains_key(id));
-            Ok(found)
+            self.panels_of(STEP, &*self.labelled(EpochId::REFERENCE)?)
         })
+    }
+
+    /// The panels among the stones of an epoch, ascending, but for stones that a person edited. `name`: of the folder
+    /// that holds the result.
+    pub fn panels_of(&self, name: &str, labelled: &Labelled) -> Result<Vec<StoneId>> {
+        let key = Key::new(STEP, &(), &[labelled.key.as_str()]);
+        let step = self.context.step(name, key, |step, _| {
+            let mut reliefs = StoneReliefs::new(&labelled.stones);
+            for tile in 0..labelled.ingested.tiles.tile_count() {
+                self.context.progress.check()?;
+                let (cloud, labels) = (labelled.ingested.tiles.load(tile)?, labelled.labels(tile)?);
+                for (i, stone) in labels.stone.iter().enumerate().filter(|(_, stone)| **stone != 0) {
+                    reliefs.add(*stone, &cloud.world(i));
+                }
+            }
+            write_json(&step.file(FILE), &panels(&labelled.stones, &reliefs))
+        })?;
+        let mut found: Vec<StoneId> = read_json(&step.file(FILE))?;
+        found.retain(|id| !labelled.edited.contains_key(id));
+        Ok(found)
     }
 }
