@@ -49,7 +49,7 @@ pub enum Command {
     #[command(after_help = "Example:\n  stonewise unit ingest-1 --out results/")]
     Unit(UnitArgs),
     /// Simulate a small survey with known motion, and measure it.
-    #[command(after_help = "Example:\n  stonewise demo --out demo")]
+    #[command(after_help = "Examples:\n  stonewise demo\n  stonewise demo --seed 8 --out elsewhere/")]
     Demo(DemoArgs),
     /// Check a survey in seconds for problems with units, coordinate systems, overlap, photos, cameras and
     /// disk space.
@@ -357,7 +357,7 @@ pub struct EditsCheckArgs {
 #[derive(Debug, ClapArgs)]
 pub struct DemoArgs {
     /// Folder of the survey and the results; created if missing.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = "demo")]
     pub out: PathBuf,
     /// Seed of the simulated wall.
     #[arg(long, default_value_t = 7)]

@@ -28,7 +28,7 @@ pub fn run_all(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome
         }
     };
     let (outcome, summary) = run_to(&folder, &project, Until::Reported, printer)?;
-    say_verdict(&summary, printer);
+    conclude(&summary, folder.path(), printer);
     let state = summary.verdict.as_ref().map(|v| v.state);
     Ok(match (args.exit_on, state) {
         (Some(_), Some(State::Alarm)) | (Some(ExitOn::Attention), Some(State::Attention)) => Outcome::Verdict,
@@ -47,7 +47,7 @@ pub fn run(args: &ProjectArgs, until: Until, force: bool, printer: &Printer) -> 
 }
 
 /// The verdict's sentence, which is the last thing that a person reads.
-pub fn say_verdict(summary: &Summary, printer: &Printer) {
+fn say_verdict(summary: &Summary, printer: &Printer) {
     if let Some(verdict) = &summary.verdict {
         verdict
             .series
@@ -57,8 +57,8 @@ pub fn say_verdict(summary: &Summary, printer: &Printer) {
     }
 }
 
-/// Runs a project up to the step `until`, in a folder that is claimed already, and prints what came out,
-/// except the verdict.
+/// Runs a project up to the step `until`, in a folder that is claimed already, and prints what came out; the caller
+/// says the verdict, which comes last.
 pub fn run_to(
     folder: &OutputFolder,
     project: &Project,
@@ -69,25 +69,19 @@ pub fn run_to(
     tell_of_project(project, printer);
     let summary = measure(folder, project, until, printer)?;
     printer.finish();
-    let outcome = match until {
-        Until::Reported => conclude(project, &summary, folder.path(), printer),
-        _ => {
-            tell(project, &summary, printer);
-            outcome_of(&summary)
-        }
-    };
-    Ok((outcome, summary))
+    tell(project, &summary, printer);
+    Ok((outcome_of(&summary), summary))
 }
 
-/// Says what came out of a finished run, and where it is.
-pub fn conclude(project: &Project, summary: &Summary, out: &Path, printer: &Printer) -> Outcome {
-    tell(project, summary, printer);
+/// Ends a finished run: says where the results and the report are, and the verdict.
+pub fn conclude(summary: &Summary, out: &Path, printer: &Printer) {
     printer.log(&format!("results: {}", out.display()));
     printer.log(&format!("open {}", out.join("report/index.html").display()));
-    outcome_of(summary)
+    say_verdict(summary, printer);
 }
 
-fn outcome_of(summary: &Summary) -> Outcome {
+/// How a finished run ended.
+pub fn outcome_of(summary: &Summary) -> Outcome {
     match summary.skipped_inputs() || summary.doubts().next().is_some() {
         true => Outcome::InDoubt,
         false => Outcome::Done,

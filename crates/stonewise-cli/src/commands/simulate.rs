@@ -34,7 +34,7 @@ pub fn demo(args: &DemoArgs, force: bool, printer: &Printer) -> Result<Outcome> 
     let (outcome, summary) = run::run_to(&folder, &project, Until::Reported, printer)?;
     super::evaluate::score(&args.out, &survey.join("truth/stones.csv"), printer)?;
     folder.note_made_anew()?;
-    run::say_verdict(&summary, printer);
+    run::conclude(&summary, &args.out, printer);
     Ok(outcome)
 }
 

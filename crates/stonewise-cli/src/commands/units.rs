@@ -2,7 +2,7 @@
 
 use crate::args::{PlanArgs, UnitArgs};
 use crate::commands::Outcome;
-use crate::commands::run::{conclude, tell_of_project};
+use crate::commands::run::{conclude, outcome_of, tell, tell_of_project};
 use crate::counted::counted;
 use crate::printer::Printer;
 use crate::stdout::stdout;
@@ -51,7 +51,9 @@ pub fn unit(args: &UnitArgs, printer: &Printer) -> Result<Outcome> {
     Ok(match &done.summary {
         Some(summary) => {
             tell_of_project(&done.project, printer);
-            conclude(&done.project, summary, &args.out, printer)
+            tell(&done.project, summary, printer);
+            conclude(summary, &args.out, printer);
+            outcome_of(summary)
         }
         None => Outcome::Done,
     })
