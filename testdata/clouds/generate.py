@@ -4,7 +4,7 @@ Every file holds the same points, so that a test can compute them again:
     x = 350000 + i / 100, y = 5650000 - i / 50, z = 100 + (i * i % 97) / 1000, metres, for i = 0 .. 119
     red, green, blue = 500 i, 65535 - 500 i, 257 (i % 256); intensity = 7 i
 Formats with 8-bit colours hold the high byte. Run here: python generate.py
-Needs numpy, laspy[lazrs], lazrs, pye57, plyfile, pypcd4.
+Needs numpy, laspy[lazrs], lazrs, pye57, plyfile.
 """
 import io
 import struct
@@ -14,7 +14,6 @@ import lazrs
 import numpy as np
 import plyfile
 import pye57
-import pypcd4
 from laspy.vlrs.vlr import VLR
 
 N = 120
@@ -179,17 +178,6 @@ def text(name, separator, header, columns, decimal="."):
             out.write(separator.join(str(v).replace(".", decimal) for v in row) + "\n")
 
 
-def pcd(name, encoding):
-    """Fields of every kind before and between those that are read. In text, pypcd4 rounds packed floats to 0."""
-    packed = pypcd4.PointCloud.encode_rgb(rgb // 257)
-    packed = packed.view("u4") if encoding == pypcd4.Encoding.ASCII else packed
-    fields = {"label": i.astype("u1"), "x": x, "rgb": packed, "y": y, "z": z,
-              "intensity": intensity, "t": i.astype("i4")}
-    cloud = pypcd4.PointCloud.from_points(list(fields.values()), list(fields), [f.dtype for f in fields.values()])
-    cloud.metadata.viewpoint = (349990.0, 5650010.0, 101.5, 1.0, 0.0, 0.0, 0.0)
-    cloud.save(name, encoding)
-
-
 def ptx(name):
     """Two scans; every tenth place of the grid has no echo. The second scanner is turned and tilted."""
     turns = [np.eye(3), rotation(0.3, 0.02, -0.7)]
@@ -237,7 +225,4 @@ text("tabs.txt", "\t", "//X\tY\tZ\tIntensity\n", xyz + [intensity])
 text("header.csv", ",", '"id","Y [m]","X [m]","Z [m]",R,G,B\n', [i, xyz[1], xyz[0], xyz[2]] + colors)
 text("german.csv", ";", "x;y;z;intensity\n", xyz + [intensity], decimal=",")
 text("count.pts", " ", f"{N}\n", xyz + [intensity] + colors)
-pcd("text.pcd", pypcd4.Encoding.ASCII)
-pcd("binary.pcd", pypcd4.Encoding.BINARY)
-pcd("compressed.pcd", pypcd4.Encoding.BINARY_COMPRESSED)
 ptx("two_scans.ptx")

@@ -11,6 +11,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::{Error, Result};
 use stonewise_base::files::write_text;
+use stonewise_io::cloud::is_unread_cloud;
 
 /// A project file for the surveys of a folder, and why it is this one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,9 +42,7 @@ const NO_EPOCHS: [&str; 7] = [
     "unfinished",
 ];
 
-/// Extensions of clouds in formats that only the programs of scanners read.
-const UNREAD: [&str; 6] = ["rcp", "rcs", "fls", "zfs", "rdbx", "lgs"];
-/// What is said of them.
+/// What is said of clouds that are recognised and not read.
 const NOT_READ: &str = "a format that is not read";
 
 /// Names of masks in a line at most.
@@ -154,9 +153,11 @@ fn unread(dir: &Path) -> Result<Vec<String>> {
     let mut open = vec![dir.to_path_buf()];
     while let Some(folder) = open.pop() {
         for file in files(&folder)? {
-            if has_extension(&file, &UNREAD) {
+            if is_unread_cloud(&file) {
                 let file = file.strip_prefix(dir).unwrap_or(&file).display().to_string();
-                lines.push(format!("left out: {file} ({NOT_READ}: export it as E57 or LAZ)"));
+                lines.push(format!(
+                    "left out: {file} ({NOT_READ}: export it as E57, LAZ or PLY)"
+                ));
             }
         }
         open.extend(folders(&folder)?.into_iter().filter(|f| !is_made_by_stonewise(f)));
@@ -319,7 +320,13 @@ mod tests {
 
     #[test]
     fn scans_in_one_folder_are_an_epoch_each() {
-        let (text, lines) = written(&["dam_2025.laz", "dam_2024.laz", "README.txt", "dam_2024.rcp"]);
+        let (text, lines) = written(&[
+            "dam_2025.laz",
+            "dam_2024.laz",
+            "README.txt",
+            "dam_2024.rcp",
+            "2024.pcd",
+        ]);
         let place = |what: &str| text.find(what).unwrap();
         assert!(place("clouds = [\"dam_2024.laz\"]") < place("clouds = [\"dam_2025.laz\"]"));
         assert!(
@@ -328,7 +335,8 @@ mod tests {
         );
         assert_eq!(text.matches("[[epochs]]").count(), 2, "{text}");
         assert!(
-            lines.contains("left out: dam_2024.rcp (a format that is not read"),
+            lines.contains("left out: dam_2024.rcp (a format that is not read")
+                && lines.contains("left out: 2024.pcd (a format"),
             "{lines}"
         );
         let (text, _) = written(&["2024_tls.laz", "2024_uav.laz", "2025_tls.laz", "2025_uav.laz"]);
@@ -344,7 +352,7 @@ mod tests {
         let (text, lines) = written(&[
             "2024/a.ptx",
             "2024/b.PTS",
-            "2025/c.pcd",
+            "2025/c.e57",
             "2025/dam_calibrated_camera_parameters.txt",
             "2025/photos/1.tif",
         ]);
@@ -352,7 +360,7 @@ mod tests {
             text.contains("clouds = [\"2024/a.ptx\", \"2024/b.PTS\"]"),
             "{text}"
         );
-        assert!(text.contains("clouds = [\"2025/c.pcd\"]"), "{text}");
+        assert!(text.contains("clouds = [\"2025/c.e57\"]"), "{text}");
         assert!(
             text.contains("cameras = \"2025/dam_calibrated_camera_parameters.txt\"")
                 && text.contains("images = \"2025/photos\""),

@@ -24,8 +24,11 @@ pub enum CloudError {
         source: io::Error,
     },
     /// Neither content nor name identifies the format.
-    #[error("unknown point cloud format: {} (known: las, laz, copc, e57, ptx, ply, pcd, and text as xyz, txt, csv, asc, pts)", .0.display())]
+    #[error("unknown point cloud format: {} (known: las, laz, copc, e57, ptx, ply, and text as xyz, txt, csv, asc, pts)", .0.display())]
     UnknownFormat(PathBuf),
+    /// A format that is recognised only to say what to give instead.
+    #[error("{}: this format is not read: export the cloud as E57, LAZ or PLY", .0.display())]
+    NotRead(PathBuf),
     /// The file violates its format, or is damaged.
     #[error("{}: {reason}", .path.display())]
     Malformed {

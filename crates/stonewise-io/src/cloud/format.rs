@@ -18,12 +18,12 @@ pub enum CloudFormat {
     Ptx,
     /// Stanford PLY, text or binary of either byte order.
     Ply,
-    /// Point Cloud Library, text, binary or compressed.
-    Pcd,
     /// Text, one point per line; PTS too.
     Text,
 }
 
+/// Extensions of clouds in formats that are not read: of scanners' own programs, and of the Point Cloud Library.
+const UNREAD_EXTENSIONS: [&str; 7] = ["rcp", "rcs", "fls", "zfs", "rdbx", "lgs", "pcd"];
 /// Extensions of text files; every other format but PTX says what it is in its first bytes.
 const TEXT_EXTENSIONS: [&str; 7] = ["xyz", "txt", "csv", "asc", "pts", "xyzrgb", "neu"];
 
@@ -37,18 +37,29 @@ impl CloudFormat {
         File::open(path)
             .and_then(|file| file.take(8).read_to_end(&mut start))
             .map_err(|e| CloudError::read(path, e))?;
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        let extension = extension.to_ascii_lowercase();
+        let extension = lower_extension(path);
         match start.as_slice() {
             s if s.starts_with(b"LASF") => Ok(Self::Las),
             s if s.starts_with(b"ASTM-E57") => Ok(Self::E57),
             [b'p', b'l', b'y', next, ..] if next.is_ascii_whitespace() => Ok(Self::Ply),
-            s if s.starts_with(b"# .PCD") || extension == "pcd" => Ok(Self::Pcd),
+            s if s.starts_with(b"# .PCD") || is_unread_cloud(path) => {
+                Err(CloudError::NotRead(path.to_owned()))
+            }
             _ if extension == "ptx" => Ok(Self::Ptx),
             _ if TEXT_EXTENSIONS.contains(&extension.as_str()) => Ok(Self::Text),
             _ => Err(wrong_start(path, &extension, start.is_empty())),
         }
     }
+}
+
+/// Whether a file is, by its name, a cloud in a format that is not read.
+pub fn is_unread_cloud(path: &Path) -> bool {
+    UNREAD_EXTENSIONS.contains(&lower_extension(path).as_str())
+}
+
+fn lower_extension(path: &Path) -> String {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    extension.to_ascii_lowercase()
 }
 
 impl fmt::Display for CloudFormat {
@@ -58,7 +69,6 @@ impl fmt::Display for CloudFormat {
             Self::E57 => "E57",
             Self::Ptx => "PTX",
             Self::Ply => "PLY",
-            Self::Pcd => "PCD",
             Self::Text => "text",
         })
     }

@@ -7,7 +7,7 @@ use stonewise_core::geometry::Bounds;
 
 use super::gathered::{CHUNK_POINTS, Created};
 use super::scan::Scan;
-use super::{CloudError, CloudFormat, ReadSummary, e57_file, las, pcd, ply, ptx, read_cloud, text};
+use super::{CloudError, CloudFormat, ReadSummary, e57_file, las, ply, ptx, read_cloud, text};
 
 /// Description of a cloud file.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,7 +55,6 @@ pub fn cloud_scans(path: &Path) -> Result<Vec<Scan>, CloudError> {
     match CloudFormat::of(path)? {
         CloudFormat::E57 => Ok(e57_file::scans(path)?.0),
         CloudFormat::Ptx => ptx::scans(path),
-        CloudFormat::Pcd => pcd::scans(path),
         CloudFormat::Text => text::scans(path),
         CloudFormat::Las | CloudFormat::Ply => Ok(Vec::new()),
     }
@@ -84,7 +83,7 @@ pub fn cloud_crs(path: &Path) -> Result<Option<String>, CloudError> {
     match CloudFormat::of(path)? {
         CloudFormat::Las => Ok(las::Layout::open(path)?.crs()),
         CloudFormat::E57 => Ok(e57_file::scans(path)?.1),
-        CloudFormat::Ptx | CloudFormat::Ply | CloudFormat::Pcd | CloudFormat::Text => Ok(None),
+        CloudFormat::Ptx | CloudFormat::Ply | CloudFormat::Text => Ok(None),
     }
 }
 
@@ -106,7 +105,7 @@ pub fn cloud_date(path: &Path) -> Result<Option<Created>, CloudError> {
                 None => Ok(e57_file::created_s(path)?.map(Created::Gps)),
             }
         }
-        CloudFormat::Ptx | CloudFormat::Ply | CloudFormat::Pcd | CloudFormat::Text => Ok(None),
+        CloudFormat::Ptx | CloudFormat::Ply | CloudFormat::Text => Ok(None),
     }
 }
 
@@ -120,7 +119,6 @@ pub fn claimed_records(path: &Path) -> Result<Option<u64>, CloudError> {
         CloudFormat::Las => Ok(Some(las::Layout::open(path)?.header.number_of_points())),
         CloudFormat::E57 => Ok(Some(e57_file::scans(path)?.0.iter().map(|s| s.records).sum())),
         CloudFormat::Ply => Ok(Some(ply::vertex_count(path)?)),
-        CloudFormat::Pcd => Ok(Some(pcd::point_count(path)?)),
         CloudFormat::Ptx | CloudFormat::Text => Ok(None),
     }
 }

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use super::chunk::Visit;
-use super::{CloudError, CloudFormat, PointChunk, ReadSummary, e57_file, las, pcd, ply, ptx, text};
+use super::{CloudError, CloudFormat, PointChunk, ReadSummary, e57_file, las, ply, ptx, text};
 
 /// Passes the points of a file to `visit`, at most `chunk_points` at a time, in the order of the file.
 ///
-/// Reads LAS 1.0 to 1.4, LAZ, COPC, E57, PTX, PLY, PCD and text (see [`CloudFormat`]); memory is bounded by the
+/// Reads LAS 1.0 to 1.4, LAZ, COPC, E57, PTX, PLY and text (see [`CloudFormat`]); memory is bounded by the
 /// chunk (LAZ unpacks faster with several times 50,000 points). An error of `visit` stops the pass and is returned.
 ///
 /// ```
@@ -38,7 +38,6 @@ pub fn read_cloud<E: From<CloudError>>(
         CloudFormat::E57 => e57_file::read(path, chunk_points, visit),
         CloudFormat::Ptx => ptx::read(path, chunk_points, visit),
         CloudFormat::Ply => ply::read(path, chunk_points, visit),
-        CloudFormat::Pcd => pcd::read(path, chunk_points, visit),
         CloudFormat::Text => text::read(path, chunk_points, visit),
     }
 }

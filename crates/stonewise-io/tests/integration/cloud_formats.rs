@@ -130,21 +130,6 @@ fn every_encoding_of_ply() {
 }
 
 #[test]
-fn every_encoding_of_pcd() {
-    for name in ["text.pcd", "binary.pcd", "compressed.pcd"] {
-        let expected = Expected {
-            color_bits: 8,
-            intensity: true,
-            tolerance_m: 1e-9,
-        };
-        check(name, &expected);
-        let scans = cloud_scans(&fixture(name)).unwrap();
-        assert_eq!(scans.len(), 1, "{name}");
-        assert_eq!(scans[0].origin, Some(Point3::new(349_990.0, 5_650_010.0, 101.5)));
-    }
-}
-
-#[test]
 fn scans_of_ptx_are_put_in_the_world_and_have_their_scanners() {
     let path = fixture("two_scans.ptx");
     for step in [7, 50, 1000] {
@@ -316,7 +301,6 @@ fn the_callers_error_ends_the_pass() {
     for name in [
         "las12_format3.las",
         "little.ply",
-        "binary.pcd",
         "plain.xyz",
         "two_scans.e57",
         "two_scans.ptx",
@@ -399,13 +383,7 @@ fn a_labelled_copy_of_las_keeps_records_and_descriptions() {
 fn a_labelled_copy_of_other_formats_keeps_order_color_and_intensity() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out.laz");
-    for name in [
-        "little.ply",
-        "header.csv",
-        "count.pts",
-        "compressed.pcd",
-        "two_scans.e57",
-    ] {
+    for name in ["little.ply", "header.csv", "count.pts", "two_scans.e57"] {
         write_labelled(&fixture(name), &out, LabelColumns::StoneAndMotion, no_labels).unwrap();
         let (before, _) = read_all(&fixture(name), 1000);
         let (after, summary) = read_all(&out, 1000);

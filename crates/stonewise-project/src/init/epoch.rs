@@ -8,8 +8,8 @@ use stonewise_io::cameras::{
 };
 
 /// Extensions of point clouds.
-pub(super) const CLOUDS: [&str; 11] = [
-    "laz", "las", "e57", "ptx", "pts", "ply", "pcd", "xyz", "txt", "csv", "asc",
+pub(super) const CLOUDS: [&str; 10] = [
+    "laz", "las", "e57", "ptx", "pts", "ply", "xyz", "txt", "csv", "asc",
 ];
 /// Folder of the masks beside those of the epochs.
 pub(super) const MASKS: &str = "masks";
@@ -32,7 +32,7 @@ const CAMERA_TEXTS: [&str; 10] = [
     "gps_bias.json",
 ];
 /// Extensions of scans that lie beside each other: no texts, which may be anything.
-const SCANS: [&str; 8] = ["laz", "las", "e57", "ptx", "pts", "ply", "pcd", "xyz"];
+const SCANS: [&str; 7] = ["laz", "las", "e57", "ptx", "pts", "ply", "xyz"];
 /// Words in names of clouds, by sensor.
 const SENSORS: [(&str, &[&str]); 2] = [
     ("terrestrial", &["tls", "terrestrial", "scanner"]),

@@ -115,12 +115,6 @@ pub fn targets() -> Vec<Target> {
         Target::of_bytes("e57", testdata(&["clouds/two_scans.e57"]), las).repaired(repair::e57),
         Target::of_bytes("ply", testdata(&["clouds/little.ply", "clouds/big.ply"]), ply),
         Target::of_text("ply text", ply_texts(), ply),
-        Target::of_bytes(
-            "pcd",
-            testdata(&["clouds/binary.pcd", "clouds/compressed.pcd"]),
-            las,
-        ),
-        Target::of_text("pcd text", testdata(&["clouds/text.pcd"]), las),
         Target::of_text("ptx", testdata(&["clouds/two_scans.ptx"]), las),
         Target::of_text(
             "xyz",

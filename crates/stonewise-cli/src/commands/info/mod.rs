@@ -19,14 +19,9 @@ use std::io::Write;
 use std::path::Path;
 use stonewise::Project;
 use stonewise_io::cameras::{is_camera_file, is_camera_folder, is_sidecar_folder, read_cameras};
-use stonewise_io::cloud::CloudFormat;
+use stonewise_io::cloud::{CloudError, CloudFormat};
 use stonewise_io::image_io::is_photo;
 use stonewise_io::masks::CocoMasks;
-
-/// Extensions of point clouds, whatever their content.
-const CLOUDS: [&str; 11] = [
-    "las", "laz", "e57", "ptx", "pts", "ply", "pcd", "xyz", "csv", "asc", "neu",
-];
 
 /// Says what each path is, one block or object each, on stdout; goes on after one that cannot be read.
 pub fn info(args: &InfoArgs) -> Result<Outcome> {
@@ -74,8 +69,10 @@ fn describe(path: &Path) -> Result<Described> {
         "txt" | "bin" if matches!(&*name, "cameras" | "images" | "points3D") => cameras(path),
         "csv" if is_camera_file(path) => cameras(path),
         _ if is_photo(path) => picture(path),
-        extension if CLOUDS.contains(&extension) || CloudFormat::of(path).is_ok() => cloud(path),
-        _ => cameras(path),
+        _ => match CloudFormat::of(path) {
+            Err(CloudError::UnknownFormat(_)) => cameras(path),
+            _ => cloud(path),
+        },
     }
 }
 
