@@ -2,16 +2,14 @@
 
 lens.json      pixels of points in the camera frame, by OpenCV's projectPoints and fisheye.projectPoints, and by the
                formulae of Metashape's user manual (appendix "Camera models") written out in numpy below.
-metashape.xml, colmap_bin/, colmap_txt/, opensfm.json, pix4d/, transforms.json, realitycapture/
+metashape.xml, colmap_bin/, colmap_txt/, opensfm.json, pix4d/, realitycapture/
                camera files with every model that is read, and expected.json with the pixels of world points in each.
-bundler/       a COLMAP model, and what `colmap model_converter --output_type Bundler` makes of it (COLMAP 3.8 of Debian).
 rejected/      COLMAP folders that must be refused.
 
 Run: python3 generate.py   (needs numpy and opencv-python-headless; OpenCV 5.0.0 and numpy 2.4.6 made the files)
 """
 import json
 import struct
-import subprocess
 from pathlib import Path
 
 import cv2
@@ -330,64 +328,6 @@ def pix4d():
     return expected
 
 
-def nerfstudio():
-    """A shared camera and two of their own; the world was turned and shifted after the reconstruction."""
-    fish = [0.031, -0.0142, 0.0051, -0.0009]
-    turn, shift = quaternion_to_matrix(random_quaternion()), rng.uniform(-9, 9, 3)
-    shared = {"camera_model": "OPENCV", "w": W, "h": H, "fl_x": FX, "fl_y": FY, "cx": CX, "cy": CY, "k1": K[0], "k2": K[1],
-              "p1": P[0], "p2": P[1]}
-    own = {
-        "images/shared.jpg": ({}, lambda p: opencv(p, FX, FY, CX, CY, K[:2] + P)),
-        "images/fisheye.jpg": (
-            {"camera_model": "OPENCV_FISHEYE", "fl_x": 1400.0, "fl_y": 1403.0, **{f"k{i + 1}": v for i, v in enumerate(fish)}},
-            lambda p: opencv_fisheye(p, 1400.0, 1403.0, CX, CY, fish)),
-        "images/k3.jpg": ({"k3": K[2]}, lambda p: opencv(p, FX, FY, CX, CY, K[:2] + P + K[2:])),
-    }
-    frames, expected = [], {}
-    for name, (camera, project) in own.items():
-        q, centre = random_quaternion(), rng.uniform(-9, 9, 3)
-        r = quaternion_to_matrix(q)
-        points = wide_rays(20) if "fisheye" in name else rays(W, H, FX, 20)
-        expected[name] = rounded(np.hstack([points @ r + centre, project(points)]))
-        pose = np.eye(4)
-        pose[:3, :3], pose[:3, 3] = turn @ r.T @ np.diag([1, -1, -1]), turn @ centre + shift
-        frames.append({"file_path": "./" + name, "transform_matrix": pose.tolist(), **camera})
-    applied = np.hstack([turn, shift[:, None]]).tolist()
-    content = {**shared, "applied_transform": applied, "ply_file_path": "sparse_pc.ply", "frames": frames}
-    (HERE / "transforms.json").write_text(json.dumps(content, indent=1) + "\n")
-    return expected
-
-
-def openmvg():
-    """Older and newer layout of intrinsics, and a photo without a pose."""
-    lenses = {
-        "pinhole.jpg": ({}, False, lambda p: opencv(p, FX, FX, CX, CY, [0, 0, 0, 0])),
-        "k1.jpg": ({"disto_k1": K[:1]}, True, lambda p: opencv(p, FX, FX, CX, CY, [K[0], 0, 0, 0])),
-        "k3.jpg": ({"disto_k3": K}, False, lambda p: opencv(p, FX, FX, CX, CY, K[:2] + [0, 0] + K[2:])),
-        "t2.jpg": ({"disto_t2": K + P}, True, lambda p: opencv(p, FX, FX, CX, CY, K[:2] + P + K[2:])),
-        "fisheye.jpg": ({"fisheye": [0.031, -0.0142, 0.0051, -0.0009]}, True,
-                        lambda p: opencv_fisheye(p, FX, FX, CX, CY, [0.031, -0.0142, 0.0051, -0.0009])),
-    }
-    pointer = lambda content: {"polymorphic_id": 1073741824, "ptr_wrapper": {"id": 2147483649, "data": content}}
-    views, intrinsics, extrinsics, expected = [], [], [], {}
-    for i, (name, (lens, is_new, project)) in enumerate(lenses.items()):
-        q, centre = random_quaternion(), rng.uniform(-9, 9, 3)
-        r = quaternion_to_matrix(q)
-        points = rays(W, H, FX, 20)
-        expected[name] = rounded(np.hstack([points @ r + centre, project(points)]))
-        base = {"width": W, "height": H, "focal_length": FX, "principal_point": [CX, CY]}
-        intrinsics.append({"key": 10 + i, "value": pointer({**({"value0": base} if is_new else base), **lens})})
-        extrinsics.append({"key": 20 + i, "value": {"rotation": r.tolist(), "center": centre.tolist()}})
-        views.append({"key": i, "value": pointer({"local_path": "", "filename": name, "width": W, "height": H, "id_view": i,
-                                                  "id_intrinsic": 10 + i, "id_pose": 20 + i})})
-    lost = {"local_path": "", "filename": "lost.jpg", "width": W, "height": H, "id_view": 9, "id_intrinsic": 10, "id_pose": 99}
-    views.append({"key": 9, "value": pointer(lost)})
-    content = {"sfm_data_version": "0.3", "root_path": "images", "views": views, "intrinsics": intrinsics,
-               "extrinsics": extrinsics, "structure": [], "control_points": []}
-    (HERE / "sfm_data.json").write_text(json.dumps(content, indent=1) + "\n")
-    return expected
-
-
 def angles(r):
     """Heading, pitch and roll of a world-to-camera rotation, as RealityCapture counts them: of an aircraft in axes north,
     east and down, about z, y and x in this order, whose camera looks down with its upper side to the nose."""
@@ -442,32 +382,9 @@ def realitycapture():
     return expected
 
 
-def bundler():
-    """COLMAP's own way from its model to Bundler's; its principal points are the middle, the only one that Bundler's format allows."""
-    model = HERE / "bundler" / "colmap"
-    model.mkdir(parents=True, exist_ok=True)
-    cameras = f"1 SIMPLE_PINHOLE 400 300 290.5 200 150\n2 SIMPLE_RADIAL 300 400 288.25 150 200 {K[0]}\n"
-    cameras += f"3 RADIAL 400 300 301.75 200 150 {K[0]} {K[1]}\n"
-    images, tracks = "", [[] for _ in range(5)]
-    world = rng.uniform(-1, 1, (5, 3))
-    for i in range(1, 4):
-        q = random_quaternion()
-        t = np.array([0.1 * i, -0.2, 9.0])  # the points lie before each photo
-        observed = " ".join(f"{10 * i + j}.5 {20 * i}.25 {j + 1}" for j in range(5))
-        images += f"{i} {num(q)} {num(t)} {i} photo_{i}.jpg\n{observed}\n"
-        for j in range(5):
-            tracks[j] += [i, j]
-    points = "".join(f"{j + 1} {num(p)} 200 190 180 0.5 {' '.join(map(str, tracks[j]))}\n" for j, p in enumerate(world))
-    for name, text in [("cameras", cameras), ("images", images), ("points3D", points)]:
-        (model / f"{name}.txt").write_text(text)
-    subprocess.run(["colmap", "model_converter", "--input_path", model, "--output_path", model.parent / "dam", "--output_type",
-                    "Bundler"], check=True)
-
-
 if __name__ == "__main__":
     compact = lambda value: json.dumps(value, separators=(",", ":")).replace('{"name"', '\n{"name"')
     (HERE / "lens.json").write_text(compact(list(lens_cases())) + "\n")
     files = {"colmap": colmap(), "metashape": metashape_file(), "opensfm": opensfm(), "pix4d": pix4d(),
-             "nerfstudio": nerfstudio(), "openmvg": openmvg(), "realitycapture": realitycapture()}
-    bundler()
+             "realitycapture": realitycapture()}
     (HERE / "expected.json").write_text(json.dumps(files, separators=(",", ":")) + "\n")

@@ -207,7 +207,7 @@ fn project_text(dir: &Path, epochs: &[Found]) -> String {
             (
                 "cameras",
                 &epoch.cameras,
-                "not found: of Metashape, RealityCapture, Pix4D, COLMAP, OpenSfM, OpenMVG, nerfstudio or Bundler",
+                "not found: of Metashape, RealityCapture, Pix4D, COLMAP or OpenSfM",
             ),
             (
                 "masks",
@@ -408,15 +408,16 @@ mod tests {
         )
         .unwrap();
         std::fs::write(of("2026/a.out"), "# Bundle file v0.3\n").unwrap();
-        let text = propose(survey.path()).unwrap().text;
+        let Proposal { text, lines } = propose(survey.path()).unwrap();
         for part in [
             "clouds = [\"2024/x.laz\"]\nimages = \"2024/images\"\ncameras = \"2024/cams.csv\"",
             "clouds = [\"2025/x.laz\"]\nimages = \"2025\"\ncameras = \"2025\"",
             "clouds = [\"2026/x.laz\"]",
-            "# cameras = \"2026/a.out\"",
         ] {
             assert!(text.contains(part), "{text}");
         }
+        let left_out = "left out: 2026/a.out (Bundler files are not read: export the cameras as COLMAP";
+        assert!(lines.join("\n").contains(left_out), "{lines:?}");
     }
 
     #[test]

@@ -124,7 +124,7 @@ fn info_tells_what_a_surveyor_asks() {
         .args(["info", "--json"])
         .arg(testdata("clouds/las12_format3.las"))
         .arg(testdata("clouds/two_scans.ptx"))
-        .arg(testdata("cameras/transforms.json"))
+        .arg(testdata("cameras/opensfm.json"))
         .output()
         .unwrap();
     let all: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();

@@ -26,12 +26,20 @@ pub enum CameraError {
     /// Not a camera file.
     #[error(
         "not a camera file: give a Metashape cameras.xml, a COLMAP folder (cameras and images, .txt or .bin), an OpenSfM \
-         reconstruction.json, Pix4D's calibrated_camera_parameters.txt or project.opf, a transforms.json or an sfm_data.json, RealityCapture's camera \
-         parameters (.csv) or a folder of its .xmp files, or a bundle.out: {}", path.display()
+         reconstruction.json, Pix4D's calibrated_camera_parameters.txt or project.opf, or RealityCapture's camera parameters \
+         (.csv) or a folder of its .xmp files: {}", path.display()
     )]
     UnknownFormat {
         /// File or folder.
         path: PathBuf,
+    },
+    /// A format that is recognised only to say what to give instead.
+    #[error("{instead}: {}", path.display())]
+    NotRead {
+        /// File.
+        path: PathBuf,
+        /// Which format it is, and what to give instead.
+        instead: &'static str,
     },
     /// A value is missing or impossible.
     #[error("{problem}, at {place}: {}", path.display())]

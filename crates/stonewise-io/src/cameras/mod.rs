@@ -1,19 +1,16 @@
-//! Posed photos from other programs: Agisoft Metashape, RealityCapture, COLMAP, OpenSfM, Pix4D (also as OPF),
-//! OpenMVG, nerfstudio, Bundler; and photos that E57 files hold.
+//! Posed photos from other programs: Agisoft Metashape, RealityCapture, COLMAP, OpenSfM, Pix4D (also as OPF);
+//! and photos that E57 files hold.
 //!
 //! Whatever the file says is turned into [`View`](stonewise_core::geometry::View)s: world frame of the file,
 //! first pixel centre at (0.5, 0.5), poses that take world to camera. Views keep the order of the file, and a
 //! view's image id is its index.
 
-mod bundler;
 mod camera_file;
 mod colmap;
 mod e57;
 mod error;
 mod map_frame;
 mod metashape;
-mod nerfstudio;
-mod openmvg;
 mod opensfm;
 mod opf;
 mod photo_sizes;
@@ -23,6 +20,7 @@ mod pose;
 mod read;
 mod realitycapture;
 mod remark;
+mod unread;
 mod xml;
 
 pub use camera_file::CameraFile;
@@ -38,5 +36,6 @@ pub use photos::{Photos, find_photos};
 pub use read::{is_camera_file, read_cameras, read_cameras_on_map};
 pub use realitycapture::is_sidecar_folder;
 pub use remark::Remark;
+pub use unread::unread_cameras;
 
 use error::{malformed, read_text};

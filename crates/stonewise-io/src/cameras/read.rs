@@ -3,8 +3,8 @@
 use super::camera_file::MAX_PIXELS;
 use super::photo_sizes::PhotoSizes;
 use super::{
-    CameraError, CameraFile, MapFrame, bundler, colmap, malformed, metashape, nerfstudio, openmvg, opensfm,
-    opf, pix4d, read_text, realitycapture,
+    CameraError, CameraFile, MapFrame, colmap, malformed, metashape, opensfm, opf, pix4d, realitycapture,
+    unread_cameras,
 };
 use std::path::Path;
 use stonewise_core::geometry::View;
@@ -17,12 +17,9 @@ use stonewise_core::geometry::View;
 /// - OpenSfM: reconstruction.json.
 /// - Pix4D: PROJECT_calibrated_camera_parameters.txt, with PROJECT_offset.xyz beside it.
 /// - Pix4D and others: the project.opf of the Open Photogrammetry Format, with the files that it names beside it.
-/// - nerfstudio and instant-ngp: transforms.json.
-/// - OpenMVG: sfm_data.json.
 /// - RealityCapture: the CSV of internal and external camera parameters, or a folder with XMP sidecars.
-/// - Bundler: bundle.out, with its list of photos beside it.
 ///
-/// The last two do not tell the sizes of the photos, which must lie in the file's folder or below it.
+/// The last does not tell the sizes of the photos, which must lie in the file's folder or below it.
 ///
 /// ```
 /// use stonewise_io::cameras::read_cameras;
@@ -59,7 +56,12 @@ pub fn read_cameras_on_map(
 ) -> Result<CameraFile, CameraError> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
-    let sizes = || PhotoSizes::below(photos.unwrap_or(folder), path);
+    if let Some(instead) = unread_cameras(path) {
+        return Err(CameraError::NotRead {
+            path: path.to_owned(),
+            instead,
+        });
+    }
     let file = if path.is_dir() {
         match colmap::is_camera_folder(path) {
             false if realitycapture::is_sidecar_folder(path) => realitycapture::read_sidecars(path, photos)?,
@@ -68,13 +70,15 @@ pub fn read_cameras_on_map(
     } else {
         match extension(path).as_str() {
             "xml" => metashape::read(path, map)?,
-            "json" => read_json(path)?,
+            "json" => opensfm::read(path)?,
             "opf" => opf::read(path)?,
             "txt" if pix4d::is_pix4d(path) => pix4d::read(path)?,
             "txt" | "bin" => colmap::read_folder(folder)?,
-            "csv" if realitycapture::is_csv(path) => realitycapture::read_csv(path, &sizes()?)?,
+            "csv" if realitycapture::is_csv(path) => {
+                let photos = PhotoSizes::below(photos.unwrap_or(folder), path)?;
+                realitycapture::read_csv(path, &photos)?
+            }
             "xmp" => realitycapture::read_sidecars(folder, photos)?,
-            "out" => bundler::read(path, &sizes()?)?,
             _ => {
                 return Err(CameraError::UnknownFormat {
                     path: path.to_owned(),
@@ -95,17 +99,6 @@ pub fn read_cameras_on_map(
     Ok(file)
 }
 
-fn read_json(path: &Path) -> Result<CameraFile, CameraError> {
-    let text = read_text(path)?;
-    if openmvg::is_openmvg(&text) {
-        openmvg::read(path)
-    } else if nerfstudio::is_transforms(&text) {
-        nerfstudio::read(path)
-    } else {
-        opensfm::read(path)
-    }
-}
-
 /// Whether a file is a camera file, by its name, or by its first lines where clouds have such names too.
 pub fn is_camera_file(path: &Path) -> bool {
     let name = path
@@ -116,10 +109,7 @@ pub fn is_camera_file(path: &Path) -> bool {
     match extension(path).as_str() {
         "xml" | "opf" => true,
         "csv" => realitycapture::is_csv(path),
-        "out" => bundler::is_bundler(path),
-        "json" => ["reconstruction", "transforms", "sfm_data"]
-            .iter()
-            .any(|n| name.contains(n)),
+        "json" => name.contains("reconstruction"),
         _ => pix4d::is_pix4d(path),
     }
 }
@@ -151,7 +141,7 @@ fn check_places(file: &CameraFile, path: &Path) -> Result<(), CameraError> {
     ))
 }
 
-fn extension(path: &Path) -> String {
+pub(super) fn extension(path: &Path) -> String {
     path.extension()
         .map(|e| e.to_string_lossy().to_lowercase())
         .unwrap_or_default()

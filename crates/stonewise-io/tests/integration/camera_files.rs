@@ -92,22 +92,39 @@ fn opensfm_puts_points_where_opencv_does() {
 }
 
 #[test]
-fn pix4d_and_nerfstudio_put_points_where_opencv_does() {
-    for (path, section) in [
-        ("pix4d/dam_calibrated_camera_parameters.txt", "pix4d"),
-        ("transforms.json", "nerfstudio"),
-    ] {
-        let file = read_cameras(&fixture(path)).unwrap();
-        assert_pixels(&file, &expected(section));
-        assert!(file.skipped.is_empty() && file.warnings.is_empty());
-    }
+fn pix4d_puts_points_where_opencv_does() {
+    let file = read_cameras(&fixture("pix4d/dam_calibrated_camera_parameters.txt")).unwrap();
+    assert_pixels(&file, &expected("pix4d"));
+    assert!(file.skipped.is_empty() && file.warnings.is_empty());
 }
 
 #[test]
-fn openmvg_puts_points_where_opencv_does() {
-    let file = read_cameras(&fixture("sfm_data.json")).unwrap();
-    assert_pixels(&file, &expected("openmvg"));
-    assert_eq!(file.skipped, [("lost.jpg".to_owned(), Remark::NotAligned)]);
+fn formats_that_are_not_read_say_what_to_export() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = "{\"fl_x\": 1400.0, \"frames\": [{\"file_path\": \"a.jpg\", \"transform_matrix\": []}]}";
+    for (name, content, expected) in [
+        (
+            "bundle.out",
+            "# Bundle file v0.3\n1 0\n",
+            "Bundler files are not read: export",
+        ),
+        ("a.out", "some log\n", "not a camera file"),
+        (
+            "any.json",
+            "{\n  \"sfm_data_version\": \"0.3\",\n",
+            "openMVG_main_openMVG2Colmap",
+        ),
+        (
+            "transforms.json",
+            poses,
+            "nerfstudio's transforms are not read: give",
+        ),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        let error = message(&path);
+        assert!(error.contains(expected), "{error}");
+    }
 }
 
 /// A folder with photos of these sizes.
@@ -167,56 +184,6 @@ fn realitycapture_warns_of_yaw_on_a_map() {
     let path = photos.path().join("cameras.csv");
     std::fs::write(&path, text.replacen(".jpg,", ".jpg,4512", 1)).unwrap();
     assert_eq!(read_cameras(&path).unwrap().warnings, [Remark::YawFromTrueNorth]);
-}
-
-#[test]
-fn bundler_agrees_with_the_colmap_model_that_it_was_made_from() {
-    let photos = photos(&[
-        ("photo_1.jpg", 400, 300),
-        ("photo_2.jpg", 300, 400),
-        ("photo_3.jpg", 400, 300),
-    ]);
-    let model = read_cameras(&fixture("bundler/colmap")).unwrap();
-    let path = fixture("bundler/dam.bundle.out");
-    let file = read_cameras_on_map(&path, Some(photos.path()), &MapFrame::default()).unwrap();
-    assert_eq!(file.views.len(), 3);
-    for (a, b) in model.views.iter().zip(&file.views) {
-        assert_eq!(a.name, b.name);
-        assert!((a.centre() - b.centre()).norm() < 1e-9);
-        for i in 0..100 {
-            let world = Point3::new(
-                f64::from(i % 5) - 2.0,
-                f64::from(i / 5 % 5) - 2.0,
-                f64::from(i / 25) - 2.0,
-            );
-            let (a, b) = (a.project(&world).unwrap().pixel, b.project(&world).unwrap().pixel);
-            assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-9, "{a:?} {b:?}");
-        }
-    }
-}
-
-#[test]
-fn bundler_leaves_out_photos_without_a_camera_and_reads_its_own_lists() {
-    let photos = photos(&[("photo_1.jpg", 400, 300), ("photo_3.jpg", 400, 300)]);
-    let text = std::fs::read_to_string(fixture("bundler/dam.bundle.out")).unwrap();
-    let path = photos.path().join("bundle.out");
-    let mut lines: Vec<&str> = text.lines().collect();
-    let nothing = ["0 0 0"; 5];
-    lines.splice(7..12, nothing);
-    std::fs::write(&path, lines.join("\n")).unwrap();
-    let list = "./photo_1.jpg\n./photo 2.jpg\n./photo_3.jpg 0 301.75\n";
-    std::fs::write(photos.path().join("list.txt"), list).unwrap();
-    let file = read_cameras(&path).unwrap();
-    let names: Vec<&str> = file.views.iter().map(|view| view.name.as_str()).collect();
-    assert_eq!(names, ["./photo_1.jpg", "./photo_3.jpg"]);
-    assert_eq!(file.skipped, [("./photo 2.jpg".to_owned(), Remark::NotAligned)]);
-    assert!(
-        find_photos(photos.path(), &file)
-            .unwrap()
-            .paths
-            .iter()
-            .all(Option::is_some)
-    );
 }
 
 #[test]
@@ -305,22 +272,6 @@ fn cameras_without_sizes_that_cannot_be_read_say_why() {
     ] {
         check("realitycapture/xmp/brown3t2.xmp", "brown3t2.xmp", from, to, part);
     }
-
-    std::fs::copy(fixture("bundler/dam.list.txt"), photos.path().join("list.txt")).unwrap();
-    for (from, to, part) in [
-        ("v0.3", "v0.9", "not a Bundler file"),
-        ("\n3 5\n", "\n3 x\n", "expected the numbers of photos and points"),
-        ("\n3 5\n", "\n99999999999999 5\n", "names 3"),
-        ("\n3 5\n", "\n3 9\n", "point 6 needs its place, colour and views"),
-        ("\n290.5 0 0\n", "\n-290.5 0 0\n", "photo photo_1.jpg"),
-        ("\n290.5 0 0\n", "\n290.5 inf 0\n", "expected 15 numbers"),
-        (" -9\n", " 9\n", "export as Bundler v0.3 (negative Z)"),
-        ("", "", "none of them can be read"),
-    ] {
-        check("bundler/dam.bundle.out", "cut.out", from, to, part);
-    }
-    std::fs::remove_file(photos.path().join("list.txt")).unwrap();
-    check("bundler/dam.bundle.out", "cut.out", "", "", "cut.list.txt");
 }
 
 #[test]
@@ -338,36 +289,6 @@ fn files_of_other_programs_that_cannot_be_read_say_why() {
             "2900.5 0",
             "-2900.5 0",
             "photo DJI 0001.JPG: its focal lengths must be positive",
-        ),
-        (
-            "sfm_data.json",
-            "\"disto_k1\": [",
-            "\"disto_k1\": [1,",
-            "camera of view k1.jpg: its lens has a wrong number of parameters",
-        ),
-        (
-            "sfm_data.json",
-            "\"rotation\": [",
-            "\"rotation\": [[0, 0, 0],",
-            "view pinhole.jpg: its pose needs a rotation of 3 x 3 and a center",
-        ),
-        (
-            "transforms.json",
-            "\"OPENCV\"",
-            "\"EQUIRECTANGULAR\"",
-            "camera model EQUIRECTANGULAR of photo",
-        ),
-        (
-            "transforms.json",
-            "\"w\": 4000",
-            "\"w\": -1",
-            "a positive w is missing",
-        ),
-        (
-            "transforms.json",
-            "\"applied_transform\": [\n  [",
-            "\"applied_transform\": [[],\n  [",
-            "applied_transform: expected 3 or 4 rows of 4 numbers",
         ),
     ] {
         let name = Path::new(source).file_name().unwrap();

@@ -4,7 +4,7 @@ use super::listing::{files, folders, has_extension, is_made_by_stonewise, name};
 use std::path::{Path, PathBuf};
 use stonewise_base::error::Result;
 use stonewise_io::cameras::{
-    CameraFile, MapFrame, find_photos, is_camera_file, is_sidecar_folder, read_cameras_on_map,
+    CameraFile, MapFrame, find_photos, is_camera_file, is_sidecar_folder, read_cameras_on_map, unread_cameras,
 };
 
 /// Extensions of point clouds.
@@ -17,7 +17,7 @@ pub(super) const MASKS: &str = "masks";
 const PHOTOS: [&str; 5] = ["jpg", "jpeg", "png", "tif", "tiff"];
 /// Names of the files that make a folder a COLMAP model.
 const COLMAP: [&str; 2] = ["images.txt", "images.bin"];
-/// Ends of the names of texts that belong to cameras: those of COLMAP, Bundler's list of photos, and the files of an
+/// Ends of the names of texts that belong to cameras: those of COLMAP, lists of photos, and the files of an
 /// OPF project.
 const CAMERA_TEXTS: [&str; 10] = [
     "images.txt",
@@ -103,6 +103,8 @@ struct Candidates {
     photo_folders: Vec<PathBuf>,
     cameras: Vec<PathBuf>,
     masks: Vec<PathBuf>,
+    /// Cameras in formats that are not read, with what to give instead.
+    unread: Vec<(PathBuf, &'static str)>,
 }
 
 /// Looks into the folder of an epoch; `root`: folder of the project file.
@@ -121,6 +123,10 @@ pub(super) fn look(root: &Path, folder: &Path) -> Result<Found> {
         clouds: found.clouds.iter().map(|p| relative(p)).collect(),
         ..Found::default()
     };
+    let unread = found.unread.iter();
+    epoch
+        .left_out
+        .extend(unread.map(|(file, instead)| (relative(file), *instead)));
     let images = photo_choices(folder, &found);
     let (cameras, photos) = best(&found.cameras, &images);
     for camera in found.cameras.iter().filter(|c| Some(*c) != cameras.as_ref()) {
@@ -191,7 +197,9 @@ fn gather(dir: &Path, found: &mut Candidates) -> Result<()> {
         list.push(dir.to_path_buf());
     }
     for file in &files {
-        if is_camera_file(file) {
+        if let Some(instead) = unread_cameras(file) {
+            found.unread.push((file.clone(), instead));
+        } else if is_camera_file(file) {
             found.cameras.push(file.clone());
         } else if CAMERA_TEXTS.iter().any(|end| name(file).ends_with(end)) {
             continue;

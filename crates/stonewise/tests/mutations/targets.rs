@@ -134,8 +134,6 @@ pub fn targets() -> Vec<Target> {
             cameras,
         )
         .beside(testdata(&["cameras/colmap_txt/cameras.txt"])),
-        Target::of_text("sfm_data", testdata(&["cameras/sfm_data.json"]), cameras),
-        Target::of_text("transforms", testdata(&["cameras/transforms.json"]), cameras),
         Target::of_text(
             "pix4d",
             testdata(&["cameras/pix4d/dam_calibrated_camera_parameters.txt"]),
@@ -151,15 +149,6 @@ pub fn targets() -> Vec<Target> {
             cameras,
         )
         .beside(vec![photo_named("none.jpg"), photo_named("brown3t2.jpg")]),
-        Target::of_text("bundler", testdata(&["cameras/bundler/dam.bundle.out"]), cameras).beside(
-            [
-                testdata(&["cameras/bundler/dam.list.txt"]),
-                vec![photo_named("photo_1.jpg")],
-            ]
-            .into_iter()
-            .flatten()
-            .collect(),
-        ),
         Target::of_bytes(
             "colmap",
             testdata(&["cameras/colmap_bin/cameras.bin", "cameras/colmap_bin/images.bin"]),

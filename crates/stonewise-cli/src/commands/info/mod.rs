@@ -18,7 +18,9 @@ use serde_json::json;
 use std::io::Write;
 use std::path::Path;
 use stonewise::Project;
-use stonewise_io::cameras::{is_camera_file, is_camera_folder, is_sidecar_folder, read_cameras};
+use stonewise_io::cameras::{
+    is_camera_file, is_camera_folder, is_sidecar_folder, read_cameras, unread_cameras,
+};
 use stonewise_io::cloud::{CloudError, CloudFormat};
 use stonewise_io::image_io::is_photo;
 use stonewise_io::masks::CocoMasks;
@@ -149,7 +151,7 @@ fn cameras(path: &Path) -> Result<Described> {
 fn json_file(path: &Path) -> Result<Described> {
     let text = std::fs::read(path).unwrap_or_default();
     let first = text.iter().find(|byte| !byte.is_ascii_whitespace());
-    if is_camera_file(path) || first != Some(&b'{') {
+    if is_camera_file(path) || unread_cameras(path).is_some() || first != Some(&b'{') {
         return cameras(path);
     }
     let masks = CocoMasks::open(path)?;
