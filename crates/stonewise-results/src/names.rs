@@ -39,7 +39,7 @@ pub const DISPLACEMENTS_VTP: &str = "displacements.vtp";
 /// The stones' faces as a coloured mesh.
 pub const FACES_PLY: &str = "stones.ply";
 /// The points of stones, coloured by their motion.
-pub const FACE_CLOUD: &str = "stones.copc.laz";
+pub const FACE_CLOUD: &str = "stones.laz";
 /// Remarks and signature of people; no run writes it.
 pub const REMARKS: &str = "remarks.json";
 /// Digests of all result files, as `b3sum` writes them.

@@ -31,7 +31,7 @@ fn a_run_writes_every_result_and_resumes_to_the_same_bytes_with_any_number_of_th
         "run.json",
         "audit_epoch1.csv",
         "audit_epoch1.csv-metadata.json",
-        "stones.copc.laz",
+        "stones.laz",
         "stones.vtp",
         "stones.gpkg",
         "evidence/crops_1_000.jpg",

@@ -1,7 +1,6 @@
 //! Point clouds of every usual format in, results out.
 
 mod chunk;
-mod coloured;
 mod details;
 mod e57_file;
 mod error;
@@ -26,7 +25,6 @@ mod text;
 mod whole;
 
 pub use chunk::{PointChunk, ReadSummary};
-pub use coloured::{ColouredPoints, write_coloured_copc};
 pub use details::{CloudDetails, cloud_details};
 pub use error::CloudError;
 pub use extra_bytes::{Dimension, ExtraType};
@@ -36,6 +34,9 @@ pub use info::{CloudInfo, claimed_records, cloud_crs, cloud_date, cloud_info, cl
 pub use label::{LabelColumns, PointLabel, PointMotion};
 pub use labelled::{select_points, write_labelled};
 pub use ply::read_mesh;
-pub use points::{ExtraColumn, Observed, PointSink, stream_points_laz, stream_scan_laz, write_points_laz};
+pub use points::{
+    ExtraColumn, Observed, PointSink, stream_coloured_laz, stream_points_laz, stream_scan_laz,
+    write_points_laz,
+};
 pub use read::read_cloud;
 pub use scan::Scan;

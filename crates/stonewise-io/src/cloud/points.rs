@@ -13,6 +13,8 @@ use super::whole::write_whole;
 
 /// Finest step of coordinates, metres; large extents get a coarser one.
 const FINEST_M: f64 = 1e-6;
+/// Finest step of coordinates in clouds to look at, metres.
+const SHOWN_M: f64 = 1e-4;
 const CHUNK_POINTS: usize = 400_000;
 
 /// Values of an extra dimension, one per point.
@@ -72,7 +74,7 @@ pub fn stream_points_laz<E: From<CloudError>>(
     columns: &[(Dimension<'_>, ExtraType)],
     write: impl FnOnce(&mut PointSink<'_>) -> Result<(), E>,
 ) -> Result<(), E> {
-    stream(path, crs, bounds, columns, GpsTimeType::Week, write)
+    stream(path, crs, bounds, columns, Kind::Points, write)
 }
 
 /// Where and when points were measured, as a scanner's software notes it.
@@ -95,7 +97,33 @@ pub fn stream_scan_laz<E: From<CloudError>>(
     columns: &[(Dimension<'_>, ExtraType)],
     write: impl FnOnce(&mut PointSink<'_>) -> Result<(), E>,
 ) -> Result<(), E> {
-    stream(path, None, bounds, columns, GpsTimeType::Standard, write)
+    stream(path, None, bounds, columns, Kind::Scan, write)
+}
+
+/// Writes points with their colours ([`PointSink::append_coloured`]), else as [`stream_points_laz`], but in point
+/// format 7 and with a step of 0.1 mm.
+///
+/// # Errors
+/// As [`stream_points_laz`].
+pub fn stream_coloured_laz<E: From<CloudError>>(
+    path: &Path,
+    crs: Option<&str>,
+    bounds: &Bounds,
+    columns: &[(Dimension<'_>, ExtraType)],
+    write: impl FnOnce(&mut PointSink<'_>) -> Result<(), E>,
+) -> Result<(), E> {
+    stream(path, crs, bounds, columns, Kind::Coloured, write)
+}
+
+/// What a new file holds.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// Points alone.
+    Points,
+    /// Points with sources and adjusted standard GPS times.
+    Scan,
+    /// Points with colours.
+    Coloured,
 }
 
 fn stream<E: From<CloudError>>(
@@ -103,20 +131,24 @@ fn stream<E: From<CloudError>>(
     crs: Option<&str>,
     bounds: &Bounds,
     columns: &[(Dimension<'_>, ExtraType)],
-    times: GpsTimeType,
+    kind: Kind,
     write: impl FnOnce(&mut PointSink<'_>) -> Result<(), E>,
 ) -> Result<(), E> {
     let descriptors = describe_all(path, columns.iter().copied())?;
     let extra_bytes = columns.iter().map(|(_, kind)| kind.size()).sum();
-    let transforms = transforms_for(bounds, FINEST_M)
+    let has_color = kind == Kind::Coloured;
+    let transforms = transforms_for(bounds, if has_color { SHOWN_M } else { FINEST_M })
         .ok_or_else(|| CloudError::unwritable(path, format!("too large for LAS: {bounds:?}")))?;
     write_whole(path, |partial| {
-        let mut header = export_header(false, transforms, extra_bytes, descriptors);
-        header.gps_time_type = times;
+        let mut header = export_header(has_color, transforms, extra_bytes, descriptors);
+        if kind == Kind::Scan {
+            header.gps_time_type = GpsTimeType::Standard;
+        }
         header.vlrs.extend(crs.and_then(crs_record));
         let mut sink = PointSink {
             path,
             columns,
+            has_color,
             bounds: *bounds,
             transforms,
             writer: LazWriter::create(partial, path, header)?,
@@ -130,6 +162,7 @@ fn stream<E: From<CloudError>>(
 pub struct PointSink<'a> {
     path: &'a Path,
     columns: &'a [(Dimension<'a>, ExtraType)],
+    has_color: bool,
     bounds: Bounds,
     transforms: Vector<Transform>,
     writer: LazWriter,
@@ -146,7 +179,24 @@ impl PointSink<'_> {
         positions: &[Point3<f64>],
         columns: &[ExtraColumn<'_>],
     ) -> Result<(), CloudError> {
-        self.append_records(positions, None, columns)
+        self.append_records(positions, None, None, columns)
+    }
+
+    /// Appends points with the sRGB colour of each, to a file of [`stream_coloured_laz`].
+    ///
+    /// # Errors
+    /// As [`Self::append`], and colours of another length.
+    pub fn append_coloured(
+        &mut self,
+        positions: &[Point3<f64>],
+        colours: &[[u8; 3]],
+        columns: &[ExtraColumn<'_>],
+    ) -> Result<(), CloudError> {
+        if colours.len() != positions.len() {
+            let reason = format!("{} colours for {} points", colours.len(), positions.len());
+            return Err(CloudError::unwritable(self.path, reason));
+        }
+        self.append_records(positions, None, Some(colours), columns)
     }
 
     /// Appends points with the source and the time of each.
@@ -167,15 +217,20 @@ impl PointSink<'_> {
             );
             return Err(CloudError::unwritable(self.path, reason));
         }
-        self.append_records(positions, Some(observed), columns)
+        self.append_records(positions, Some(observed), None, columns)
     }
 
     fn append_records(
         &mut self,
         positions: &[Point3<f64>],
         observed: Option<Observed<'_>>,
+        colours: Option<&[[u8; 3]]>,
         columns: &[ExtraColumn<'_>],
     ) -> Result<(), CloudError> {
+        if colours.is_some() != self.has_color {
+            let reason = "a file has colours for all of its points or for none";
+            return Err(CloudError::unwritable(self.path, reason));
+        }
         self.check(positions, columns)?;
         for start in (0..positions.len()).step_by(CHUNK_POINTS) {
             let mut out = Vec::new();
@@ -183,7 +238,7 @@ impl PointSink<'_> {
                 let record = Export {
                     position: *position,
                     intensity: 0,
-                    color: None,
+                    color: colours.map(|all| all[i].map(|c| u16::from(c) * 257)),
                     source: observed.map_or(0, |o| o.sources[i]),
                     gps_time: observed.map_or(0.0, |o| o.times[i]),
                 };

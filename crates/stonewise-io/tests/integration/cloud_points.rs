@@ -7,8 +7,8 @@ use las::Reader;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use stonewise_core::geometry::Bounds;
 use stonewise_io::cloud::{
-    CloudError, Dimension, ExtraColumn, ExtraType, Observed, cloud_info, read_cloud, stream_points_laz,
-    stream_scan_laz, write_points_laz,
+    CloudError, Dimension, ExtraColumn, ExtraType, Observed, cloud_info, read_cloud, stream_coloured_laz,
+    stream_points_laz, stream_scan_laz, write_points_laz,
 };
 
 /// Keeps a file for `testdata/clouds/check_written.py`, where an environment variable names its folder.
@@ -82,6 +82,50 @@ fn sources_and_times_of_a_scan_come_back() {
     let data = reader.read_all().unwrap();
     assert!(data.point_source_id().eq(sources));
     assert!(data.gps_time().unwrap().eq(times));
+}
+
+#[test]
+fn coloured_points_come_back_with_their_numbers_and_system() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("stones.laz");
+    let wkt = "PROJCS[\"x\",AUTHORITY[\"EPSG\",\"25832\"]]";
+    let at = |i: u32| {
+        Point3::new(
+            451_000.0 + f64::from(i) * 0.0101,
+            5_601_000.0,
+            310.25 - f64::from(i),
+        )
+    };
+    let points: Vec<_> = (0..900).map(at).collect();
+    let colours: Vec<[u8; 3]> = (0..900u32).map(|i| [(i % 256) as u8, 0, 255]).collect();
+    let numbers: Vec<f32> = (0..900u16).map(f32::from).collect();
+    let bounds = Bounds::of(points.iter().copied()).unwrap();
+    let columns = [(Dimension::new("place", "", "number of the point"), ExtraType::F32)];
+    stream_coloured_laz(&path, Some(wkt), &bounds, &columns, |sink| {
+        let all = [ExtraColumn::F32(&numbers)];
+        assert!(sink.append(&points, &all).is_err());
+        assert!(sink.append_coloured(&points, &colours[1..], &all).is_err());
+        for part in [0..400, 400..900] {
+            let number = ExtraColumn::F32(&numbers[part.clone()]);
+            sink.append_coloured(&points[part.clone()], &colours[part], &[number])?;
+        }
+        Ok::<(), CloudError>(())
+    })
+    .unwrap();
+    let mut reader = Reader::from_path(&path).unwrap();
+    assert_eq!(cloud_info(&path).unwrap().crs.as_deref(), Some(wkt));
+    let mut read = 0;
+    for (i, point) in reader.points().map(Result::unwrap).enumerate() {
+        assert!((Point3::new(point.x, point.y, point.z) - points[i]).amax() < 0.51e-4);
+        let colour = point.color.unwrap();
+        assert_eq!(
+            [colour.red, colour.green, colour.blue],
+            colours[i].map(|c| u16::from(c) * 257)
+        );
+        assert_eq!(point.extra_bytes, numbers[i].to_le_bytes());
+        read += 1;
+    }
+    assert_eq!(read, 900);
 }
 
 #[test]

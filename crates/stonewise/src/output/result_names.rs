@@ -134,6 +134,7 @@ mod tests {
             "stones.csv",
             "stones_2.parquet",
             "stones.geo.parquet",
+            "stones.copc.laz",
             "stones.csv-metadata.json",
             "m3c2.laz",
             "m3c2_3.csv",

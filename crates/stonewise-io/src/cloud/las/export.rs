@@ -61,16 +61,6 @@ pub struct Export {
 }
 
 impl Export {
-    /// The position as a file with this scale and offset has it.
-    pub fn rounded(&self, transforms: &Vector<Transform>) -> Point3<f64> {
-        let axes = [&transforms.x, &transforms.y, &transforms.z];
-        let rounded = |axis: usize| {
-            let Transform { scale, offset } = axes[axis];
-            ((self.position[axis] - offset) / scale).round() * scale + offset
-        };
-        Point3::new(rounded(0), rounded(1), rounded(2))
-    }
-
     /// Appends the record in point format 7, or 6 without colour; the position must lie in the transform's
     /// box.
     pub fn append(&self, transforms: &Vector<Transform>, out: &mut Vec<u8>) {

@@ -2,7 +2,6 @@
 
 mod chunks;
 mod compression;
-mod copc;
 mod copy;
 mod crs_record;
 mod details;
@@ -15,7 +14,6 @@ mod stream;
 mod unpack;
 mod writer;
 
-pub(super) use copc::CopcWriter;
 pub(super) use copy::copy_labelled;
 pub(super) use crs_record::crs_record;
 pub(super) use details::details;

@@ -4,9 +4,8 @@ use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use las::point::Format;
-use las::{Builder, Header, PointData, PointDataBuilder, Vlr, raw};
-use laz::{LazVlr, LazVlrBuilder, ParLasZipCompressor};
+use las::{Builder, Header, PointDataBuilder, raw};
+use laz::ParLasZipCompressor;
 
 use super::crs_record::is_wkt;
 use super::las_error::las_error;
@@ -27,31 +26,11 @@ pub struct LazWriter {
 
 impl LazWriter {
     /// Starts a file at `partial`; errors name it `name`.
-    pub fn create(partial: &Path, name: &Path, builder: Builder) -> Result<Self, CloudError> {
-        Self::begin(partial, name, builder, Header::add_laz_vlr)
-    }
-
-    /// Starts a file whose chunks [`write_chunks`](Self::write_chunks) gives.
-    pub fn with_variable_chunks(
-        partial: &Path,
-        name: &Path,
-        mut builder: Builder,
-    ) -> Result<Self, CloudError> {
-        let record = variable_chunks(builder.point_format).map_err(|e| unwritable(name, e))?;
-        builder.vlrs.push(record);
-        Self::begin(partial, name, builder, |_| Ok(()))
-    }
-
-    fn begin(
-        partial: &Path,
-        name: &Path,
-        mut builder: Builder,
-        describe_compression: impl FnOnce(&mut Header) -> las::Result<()>,
-    ) -> Result<Self, CloudError> {
+    pub fn create(partial: &Path, name: &Path, mut builder: Builder) -> Result<Self, CloudError> {
         builder.point_format.is_compressed = true;
         let mut header = builder.into_header().map_err(|e| unwritable(name, e))?;
         header.clear();
-        describe_compression(&mut header).map_err(|e| unwritable(name, e))?;
+        header.add_laz_vlr().map_err(|e| unwritable(name, e))?;
         let vlr = header.laz_vlr().map_err(|e| unwritable(name, e))?;
         let file = File::create(partial).map_err(|e| CloudError::write(name, e))?;
         let mut file = BufWriter::with_capacity(1 << 20, file);
@@ -64,50 +43,21 @@ impl LazWriter {
         })
     }
 
-    /// The file that errors name.
-    pub fn name(&self) -> &Path {
-        &self.name
-    }
-
-    /// How the points are compressed.
-    pub fn compression(&self) -> &LazVlr {
-        self.compressor.vlr()
-    }
-
     /// Appends whole point records.
     pub fn write(&mut self, records: Vec<u8>) -> Result<(), CloudError> {
         if records.is_empty() {
             return Ok(());
         }
-        let points = self.counted(records)?;
-        let Self { name, compressor, .. } = self;
-        guarded_write(name, || {
-            let written = compressor.compress_many(points.raw_bytes());
-            written.map_err(|e| CloudError::write(name, e))
-        })
-    }
-
-    /// Appends chunks of whole point records, none of them empty.
-    pub fn write_chunks(&mut self, chunks: Vec<Vec<u8>>) -> Result<(), CloudError> {
-        let chunks = { chunks.into_iter() }
-            .map(|records| self.counted(records))
-            .collect::<Result<Vec<_>, _>>()?;
-        let Self { name, compressor, .. } = self;
-        guarded_write(name, || {
-            let chunks: Vec<&[u8]> = chunks.iter().map(PointData::raw_bytes).collect();
-            let written = compressor.compress_chunks(chunks);
-            written.map_err(|e| CloudError::write(name, e))
-        })
-    }
-
-    /// Point records that the header counts.
-    fn counted(&mut self, records: Vec<u8>) -> Result<PointData, CloudError> {
         let points = PointDataBuilder::new()
             .for_header(&self.header)
             .build_from_bytes(records)
             .map_err(|e| unwritable(&self.name, e))?;
         self.header.add_point_data(&points);
-        Ok(points)
+        let Self { name, compressor, .. } = self;
+        guarded_write(name, || {
+            let written = compressor.compress_many(points.raw_bytes());
+            written.map_err(|e| CloudError::write(name, e))
+        })
     }
 
     /// Writes what comes after the points, and the final header.
@@ -159,21 +109,8 @@ fn write_end(file: &mut BufWriter<File>, header: Header) -> las::Result<()> {
     raw.write_to(&mut *file)
 }
 
-/// The record of points in chunks of any size.
-fn variable_chunks(format: Format) -> las::Result<Vlr> {
-    let chunks = LazVlrBuilder::default().with_point_format(format.to_u8()?, format.extra_bytes)?;
-    let mut data = Vec::new();
-    chunks.with_variable_chunk_size().build().write_to(&mut data)?;
-    Ok(Vlr {
-        user_id: LazVlr::USER_ID.to_owned(),
-        record_id: LazVlr::RECORD_ID,
-        description: LazVlr::DESCRIPTION.to_owned(),
-        data,
-    })
-}
-
 /// An error of writing that names the file.
-pub fn unwritable(name: &Path, error: las::Error) -> CloudError {
+fn unwritable(name: &Path, error: las::Error) -> CloudError {
     match error {
         las::Error::Io(e) | las::Error::LasZipError(laz::LasZipError::IoError(e)) => {
             CloudError::write(name, e)

@@ -13,7 +13,7 @@ use crate::results::names::FACE_CLOUD as FILE;
 use std::collections::BTreeMap;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::epoch::EpochId;
-use stonewise_io::cloud::{Dimension, write_coloured_copc};
+use stonewise_io::cloud::{Dimension, ExtraColumn, ExtraType, stream_coloured_laz};
 
 /// Writes the points of stones in the colours of the first later epoch.
 pub static FACE_CLOUD: Step = Step {
@@ -42,44 +42,61 @@ const DIMENSIONS: [Dimension; 6] = [
     Dimension::new("lod95_mm", "mm", "95 % detection limit"),
 ];
 
-/// Writes `stones.copc.laz`: every point of a stone of the first epoch, coloured by its motion out of the wall on
-/// the scale of the report, grey where that was not measured.
+/// How far points may lie outside the boxes of their tiles, by rounding, metres.
+const ROUNDING_M: f64 = 1e-3;
+
+/// Writes `stones.laz`: every point of a stone of the first epoch, coloured by its motion out of the wall on the
+/// scale of the report, grey where that was not measured.
 fn write_face_cloud(context: &Context, first: &Labelled, rows: &[StoneRow]) -> Result<()> {
     let colours = FaceColours::new(rows);
     let by_id: BTreeMap<u32, &StoneRow> = rows.iter().map(|r| (r.stone_id, r)).collect();
     let tiles = &first.ingested.tiles;
-    let parts: Vec<_> = (0..tiles.tile_count()).map(|t| tiles.bounds(t)).collect();
-    if parts.is_empty() {
+    let boxes = (0..tiles.tile_count()).map(|t| tiles.bounds(t));
+    let Some(bounds) = boxes.reduce(|a, b| a.union(&b)) else {
         return Ok(());
-    }
+    };
     let crs = coordinate_system(context.project)?;
     let crs = crs.map(|c| c.text());
 
-    context.progress.begin("face cloud", parts.len() as u64);
-    write_coloured_copc(
+    context.progress.begin("face cloud", tiles.tile_count() as u64);
+    stream_coloured_laz(
         &context.out.join(FILE),
-        parts,
-        tiles.surveyed.point_count(),
-        &DIMENSIONS,
         crs.as_deref(),
-        |tile, out| {
-            context.progress.check()?;
-            let labels = first.labels(tile)?;
-            if labels.stone.iter().any(|s| *s != 0) {
-                let cloud = tiles.load(tile)?;
-                for (i, stone) in labels.stone.iter().enumerate().filter(|(_, s)| **s != 0) {
-                    let row = by_id.get(stone).copied();
-                    let motion = row.and_then(|r| r.motion.as_ref());
-                    let mm = motion.map_or([f32::NAN; 5], |m| {
-                        let [a, u, o] = [m.face.x, m.face.y, m.face.z];
-                        [a, u, o, m.displacement.norm(), m.detection_limit_m].map(|v| (v * 1e3) as f32)
-                    });
-                    let numbers = [*stone as f32, mm[0], mm[1], mm[2], mm[3], mm[4]];
-                    out.push(cloud.world(i), colours.of(row), &numbers)?;
+        &bounds.grown(ROUNDING_M),
+        &DIMENSIONS.map(|dimension| (dimension, ExtraType::F32)),
+        |out| {
+            for tile in 0..tiles.tile_count() {
+                context.progress.check()?;
+                let labels = first.labels(tile)?;
+                let of_stones = || labels.stone.iter().enumerate().filter(|(_, stone)| **stone != 0);
+                if of_stones().next().is_some() {
+                    let cloud = tiles.load(tile)?;
+                    let positions: Vec<_> = of_stones().map(|(i, _)| cloud.world(i)).collect();
+                    let rows = || of_stones().map(|(_, stone)| (*stone, by_id.get(stone).copied()));
+                    let shown: Vec<_> = rows().map(|(_, row)| colours.of(row)).collect();
+                    let numbers = columns(rows());
+                    let numbers = numbers.each_ref().map(|column| ExtraColumn::F32(column));
+                    out.append_coloured(&positions, &shown, &numbers)?;
                 }
+                context.progress.advance(1);
             }
-            context.progress.advance(1);
             Ok(())
         },
     )
+}
+
+/// The values of the dimensions, of points of these stones.
+fn columns<'a>(stones: impl Iterator<Item = (u32, Option<&'a StoneRow>)>) -> [Vec<f32>; DIMENSIONS.len()] {
+    let mut columns = [const { Vec::new() }; DIMENSIONS.len()];
+    for (stone, row) in stones {
+        let motion = row.and_then(|r| r.motion.as_ref());
+        let [along, up, out, norm, lod] = motion.map_or([f32::NAN; 5], |m| {
+            let [along, up, out] = [m.face.x, m.face.y, m.face.z];
+            [along, up, out, m.displacement.norm(), m.detection_limit_m].map(|v| (v * 1e3) as f32)
+        });
+        for (column, value) in columns.iter_mut().zip([stone as f32, along, up, out, norm, lod]) {
+            column.push(value);
+        }
+    }
+    columns
 }
