@@ -28,8 +28,6 @@ pub const ZONES: &str = "zones.parquet";
 pub const EVALUATION_TRUTH: &str = "evaluation_truth.json";
 /// Layers for QGIS.
 pub const GEOPACKAGE: &str = "stones.gpkg";
-/// The stones as polygons for any program that reads GeoJSON.
-pub const GEOJSON: &str = "stones.geojson";
 /// The stones as a table with their polygons.
 pub const GEOPARQUET: &str = "stones.geo.parquet";
 /// The stones' faces for ParaView.

@@ -15,7 +15,7 @@ pub fn report(args: &ReportArgs, force: bool, printer: &Printer) -> Result<Outco
     stonewise::export::write_layers(&args.results)?;
     folder.note_made_anew()?;
     printer.log(&format!(
-        "wrote {}, stones.gpkg, stones.geojson, stones.geo.parquet, stones.vtp and stones.ply",
+        "wrote {}, stones.gpkg, stones.geo.parquet, stones.vtp and stones.ply",
         args.results.join("report/index.html").display()
     ));
     if let Some(pdf) = &pdf {

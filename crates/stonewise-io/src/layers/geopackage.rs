@@ -249,7 +249,7 @@ fn sql_type(column: &Column) -> &'static str {
 }
 
 /// A cell; empty cells and numbers that are not finite become NULL.
-pub(super) fn cell(column: &Column, row: usize) -> Value {
+fn cell(column: &Column, row: usize) -> Value {
     if !column.is_filled(row) {
         return Value::Null;
     }

@@ -1,7 +1,6 @@
-//! Layers of features for other programs: GeoPackage, GeoJSON and GeoParquet for geographic information systems, VTK
-//! for ParaView. Polygons of a GeoPackage are read back, too.
+//! Layers of features for other programs: GeoPackage and GeoParquet for geographic information systems, VTK for
+//! ParaView. Polygons of a GeoPackage are read back, too.
 
-mod geojson;
 mod geometry;
 mod geopackage;
 mod geoparquet;
@@ -11,7 +10,6 @@ mod read_polygons;
 mod schema;
 mod vtk;
 
-pub use geojson::write_geojson;
 pub use geopackage::{LayerError, write_geopackage};
 pub use geoparquet::write_geoparquet;
 pub use layer::{Geometry, Layer, LayerStyle};

@@ -4,14 +4,14 @@ use super::face_mesh::face_mesh;
 use super::layers::layers;
 use super::polygons::{centroids, face_polygons};
 use crate::ResultSet;
-use crate::names::{DISPLACEMENTS_VTP, FACES_PLY, FACES_VTP, GEOJSON, GEOPACKAGE, GEOPARQUET};
+use crate::names::{DISPLACEMENTS_VTP, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET};
 use crate::records::Timestamp;
 use std::path::Path;
 use stonewise_base::error::Error;
-use stonewise_io::layers::{write_geojson, write_geopackage, write_geoparquet, write_vtp};
+use stonewise_io::layers::{write_geopackage, write_geoparquet, write_vtp};
 use stonewise_io::mesh_ply::write_coloured_mesh;
 
-/// Makes `stones.gpkg`, `stones.geojson`, `stones.geo.parquet`, `stones.vtp`, `displacements.vtp` and `stones.ply`
+/// Makes `stones.gpkg`, `stones.geo.parquet`, `stones.vtp`, `displacements.vtp` and `stones.ply`
 /// from the result files in `dir`.
 ///
 /// The GeoPackage has the stones in the world frame (`stones`), unrolled (`stones_facade`), their
@@ -36,7 +36,6 @@ pub fn write_layers(dir: &Path) -> Result<(), Error> {
     }
     write_geopackage(&dir.join(GEOPACKAGE), &layers, &surveyed(&results).to_string())?;
     if let Some(world) = layers.first() {
-        write_geojson(&dir.join(GEOJSON), world)?;
         write_geoparquet(&dir.join(GEOPARQUET), world)?;
     }
     for (name, data) in [
@@ -68,13 +67,13 @@ mod tests {
     use crate::{STONE_COLUMNS, StoneRow, write_stones};
     use serde_json::Value;
     use stonewise_io::layers::read_polygons;
+    use stonewise_io::table::read_parquet;
 
     #[test]
     fn all_layers_are_written_again_with_the_same_bytes() {
         let folder = folder(&rows());
         let names = [
             "stones.gpkg",
-            "stones.geojson",
             "stones.geo.parquet",
             "stones.ply",
             "stones.csv-metadata.json",
@@ -87,11 +86,11 @@ mod tests {
         };
         let first = bytes();
         assert!(first == bytes(), "bytes differ");
-        let json: Value = serde_json::from_slice(&first[1]).unwrap();
-        assert_eq!(json["features"].as_array().unwrap().len(), 24);
-        assert_eq!(json["features"][2]["properties"]["status"], "unmatched_lost");
-        assert_eq!(json["features"][2]["properties"]["d_out"], Value::Null);
-        let notes: Value = serde_json::from_slice(&first[4]).unwrap();
+        let table = read_parquet(&folder.path().join(GEOPARQUET)).unwrap();
+        let states = table.required::<String>("status").unwrap();
+        assert_eq!((states.len(), states[2].as_str()), (24, "unmatched_lost"));
+        assert_eq!(table.optional::<f64>("d_out").unwrap()[2], None);
+        let notes: Value = serde_json::from_slice(&first[3]).unwrap();
         assert_eq!(
             notes["tableSchema"]["columns"].as_array().unwrap().len(),
             STONE_COLUMNS.len()
@@ -103,20 +102,17 @@ mod tests {
         let stones = |rows: &[StoneRow]| {
             let folder = folder(rows);
             write_layers(folder.path()).unwrap();
-            let json = std::fs::read(folder.path().join(GEOJSON)).unwrap();
-            let json: Value = serde_json::from_slice(&json).unwrap();
+            let table = read_parquet(&folder.path().join(GEOPARQUET)).unwrap();
             let polygons = read_polygons(&folder.path().join(GEOPACKAGE), "stones").unwrap();
             assert_eq!(polygons.len(), rows.len());
             let vtp = std::fs::read_to_string(folder.path().join(DISPLACEMENTS_VTP)).unwrap();
             assert!(vtp.contains("NumberOfPoints=\"0\""), "no stone was measured");
-            json["features"].as_array().unwrap().clone()
+            table.optional::<f64>("d_out").unwrap()
         };
-        assert_eq!(stones(&[]), [Value::Null; 0]);
+        assert_eq!(stones(&[]), []);
         let mut unmatched = rows();
         unmatched.iter_mut().for_each(|r| r.motion = None);
-        let stones = stones(&unmatched);
-        assert_eq!(stones.len(), 24);
-        assert!(stones.iter().all(|s| s["properties"]["d_out"] == Value::Null));
+        assert_eq!(stones(&unmatched), [None; 24]);
     }
 
     #[test]

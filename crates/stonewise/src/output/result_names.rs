@@ -2,7 +2,7 @@
 
 use crate::project::Project;
 use crate::results::names::{
-    DISPLACEMENTS_VTP, EVALUATION_TRUTH, EVIDENCE_DIR, FACES_PLY, FACES_VTP, GEOJSON, GEOPACKAGE, GEOPARQUET,
+    DISPLACEMENTS_VTP, EVALUATION_TRUTH, EVIDENCE_DIR, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET,
     REPORT_DIR, WORK_DIR,
 };
 use std::path::{Path, PathBuf};
@@ -45,7 +45,7 @@ const REPORT: [&str; 8] = [
     "joints",
     "observations",
 ];
-/// Their extensions; `csv-metadata.json` is `json`.
+/// Their extensions; `csv-metadata.json` is `json`, and earlier versions wrote `geojson`.
 const EXTENSIONS: [&str; 12] = [
     "csv", "parquet", "json", "geojson", "gpkg", "laz", "vtp", "ply", "html", "jpg", "png", "b3",
 ];
@@ -97,14 +97,7 @@ pub(super) fn is_result(file: &Path) -> bool {
 /// Whether a command makes this result anew from others after the run: the report, the layers, and scores
 /// against a truth of the user's.
 pub(super) fn is_made_anew(file: &Path) -> bool {
-    let layers = [
-        GEOPACKAGE,
-        GEOJSON,
-        GEOPARQUET,
-        FACES_VTP,
-        DISPLACEMENTS_VTP,
-        FACES_PLY,
-    ];
+    let layers = [GEOPACKAGE, GEOPARQUET, FACES_VTP, DISPLACEMENTS_VTP, FACES_PLY];
     file.starts_with(REPORT_DIR) || file == EVALUATION_TRUTH || layers.iter().any(|layer| file == *layer)
 }
 
@@ -135,6 +128,7 @@ mod tests {
             "stones_2.parquet",
             "stones.geo.parquet",
             "stones.copc.laz",
+            "stones.geojson",
             "stones.csv-metadata.json",
             "m3c2.laz",
             "m3c2_3.csv",

@@ -168,7 +168,7 @@ fn values(old: &Path, new: &Path, scratch: &Path) -> Result<ByValue> {
             };
             by_cells([as_text(old, "old.csv")?, as_text(new, "new.csv")?])
         }
-        "json" | "geojson" => {
+        "json" => {
             let [old, new]: [Value; 2] = [read_json(old)?, read_json(new)?];
             first_difference(&old, &new, &tolerance)
         }

@@ -10,8 +10,8 @@ use crate::output::named_results_in;
 use crate::pipeline::verdict_of_tables;
 use crate::report::write_report;
 use crate::results::names::{
-    DISPLACEMENTS_VTP, FACES_PLY, FACES_VTP, GEOJSON, GEOPACKAGE, GEOPARQUET, PairFile, REPORT_DIR, RUN,
-    SERIES, VERDICT,
+    DISPLACEMENTS_VTP, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET, PairFile, REPORT_DIR, RUN, SERIES,
+    VERDICT,
 };
 use crate::results::records::{EpochRecord, RunRecord};
 use crate::results::{ResultSet, StoneRow, write_stones_csv};
@@ -186,17 +186,7 @@ fn made_again(results: &Path, run: &RunRecord) -> Result<Vec<Finding>> {
     if files.is_empty() {
         return Ok(Vec::new());
     }
-    files.extend(
-        [
-            GEOPACKAGE,
-            GEOJSON,
-            GEOPARQUET,
-            FACES_VTP,
-            DISPLACEMENTS_VTP,
-            FACES_PLY,
-        ]
-        .map(PathBuf::from),
-    );
+    files.extend([GEOPACKAGE, GEOPARQUET, FACES_VTP, DISPLACEMENTS_VTP, FACES_PLY].map(PathBuf::from));
     write_report(scratch.path())?;
     write_layers(scratch.path())?;
     let other_maker = Maker::of(run).differs(&Maker::present());
