@@ -1,15 +1,12 @@
-//! What the report's tables say, as CSV beside it, and the paths of zones as observations of OGC SensorThings.
+//! What the report's tables say, as CSV beside it.
 
-use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::Path;
 use stonewise_base::error::Error;
 use stonewise_core::series::{Departure, Word};
-use stonewise_io::atomic::write_atomically;
 use stonewise_io::table::{Table, TableError, write_csv};
 use stonewise_results::records::{
-    AnswerVerdict, DeformedZone, EpochVerdict, EstimateRecord, RunRecord, SeriesVerdict, TrendsRecord,
-    ZoneTrend,
+    AnswerVerdict, DeformedZone, EpochVerdict, RunRecord, SeriesVerdict, TrendsRecord, ZoneTrend,
 };
 use stonewise_results::{Joint, JointMotion, ResultSet, joints};
 
@@ -70,10 +67,6 @@ pub(crate) fn write_tables(folder: &Path, all: &[ResultSet]) -> Result<(), Error
             "paths of the wall and of its zones",
             None,
         )?;
-        let path = folder.join("observations.json");
-        let text = format!("{:#}\n", things(newest, trends));
-        write_atomically(&path, |partial| std::fs::write(partial, text))
-            .map_err(Error::io("writing observations", &path))?;
     }
     Ok(())
 }
@@ -364,13 +357,9 @@ fn joint_table(all: &[ResultSet]) -> Result<Table, TableError> {
     Ok(table)
 }
 
-/// The wall and the zones that have a path.
-fn groups(trends: &TrendsRecord) -> impl Iterator<Item = &ZoneTrend> {
-    trends.wall.iter().chain(&trends.zones)
-}
-
 fn paths(trends: &TrendsRecord) -> Result<Table, TableError> {
-    let rows: Vec<_> = groups(trends)
+    let groups = trends.wall.iter().chain(&trends.zones);
+    let rows: Vec<_> = groups
         .flat_map(|z| z.path.iter().map(move |p| (z.zone_id, p)))
         .collect();
     let mut table = Table::new();
@@ -414,69 +403,4 @@ fn paths(trends: &TrendsRecord) -> Result<Table, TableError> {
         )?;
     }
     Ok(table)
-}
-
-/// The paths as entities of OGC SensorThings 1.1: a thing for the wall and for each zone, with what belongs to it, each of
-/// which a server takes as it is (deep insert).
-fn things(results: &ResultSet, trends: &TrendsRecord) -> Value {
-    let wall = results.run.as_ref().map_or("", |run| &run.project.name);
-    let version = results.run.as_ref().map_or("", |run| &run.version);
-    let thing = |group: &ZoneTrend| {
-        let name = match group.zone_id {
-            0 => wall.to_owned(),
-            id => format!("{wall}, zone {id} of epoch {}", group.epoch),
-        };
-        let stream = |axis: usize| {
-            let (end, words) = AXES[axis];
-            let observation = |(date, found): (&String, EstimateRecord)| {
-                json!({
-                    "phenomenonTime": instant(date),
-                    "result": found.value[axis],
-                    "resultQuality": [{
-                        "nameOfMeasure": "standard deviation",
-                        "value": found.sd[axis],
-                        "valueUnit": "m",
-                    }],
-                })
-            };
-            let measured = group.path.iter().filter_map(|p| Some((&p.date, p.measured?)));
-            json!({
-                "name": format!("{name}: deformation {words}"),
-                "description": format!("mean deformation of {} stones since the reference, {words}", group.stones),
-                "observationType": "http://www.opengis.net/def/observationType/OGC-OM/2.0/OM_Measurement",
-                "unitOfMeasurement": {
-                    "name": "metre",
-                    "symbol": "m",
-                    "definition": "http://www.opengis.net/def/uom/UCUM/m",
-                },
-                "ObservedProperty": {
-                    "name": format!("deformation_{end}"),
-                    "definition": "http://qudt.org/vocab/quantitykind/Displacement",
-                    "description": format!("motion less the rigid motion of the part of the wall that kept its shape, {words}"),
-                },
-                "Sensor": {
-                    "name": "stonewise",
-                    "description": format!("stonewise {version}: stones in point clouds and photos"),
-                    "encodingType": "application/json",
-                    "metadata": "run.json",
-                },
-                "Observations": measured.map(observation).collect::<Vec<_>>(),
-            })
-        };
-        json!({
-            "name": name,
-            "description": format!("{} stones", group.stones),
-            "properties": { "zone_id": group.zone_id, "epoch": group.epoch },
-            "Datastreams": [stream(0), stream(1), stream(2)],
-        })
-    };
-    json!({ "Things": groups(trends).map(thing).collect::<Vec<_>>() })
-}
-
-/// A date as an instant of ISO 8601.
-fn instant(date: &str) -> String {
-    match date.contains(['T', ' ']) {
-        true => date.replacen(' ', "T", 1),
-        false => format!("{date}T00:00:00Z"),
-    }
 }

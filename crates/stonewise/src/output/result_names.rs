@@ -34,7 +34,7 @@ const STEMS: [&str; 22] = [
     "c2m",
     "digests",
 ];
-/// Files in the folder of the report, likewise.
+/// Files in the folder of the report, likewise; earlier versions wrote `observations`.
 const REPORT: [&str; 8] = [
     "index",
     "yearly",
@@ -136,6 +136,7 @@ mod tests {
             "evaluation_truth.json",
             "report/index.html",
             "report/index_2.html",
+            "report/observations.json",
             "evidence/crops_1_000.jpg",
             "evidence/crop_outlines_2.parquet",
             "evidence/logo.png",
