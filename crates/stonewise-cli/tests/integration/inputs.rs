@@ -124,7 +124,7 @@ fn info_tells_what_a_surveyor_asks() {
         .args(["info", "--json"])
         .arg(testdata("clouds/las12_format3.las"))
         .arg(testdata("clouds/two_scans.ptx"))
-        .arg(testdata("cameras/opensfm.json"))
+        .arg(testdata("cameras/pix4d/dam_calibrated_camera_parameters.txt"))
         .output()
         .unwrap();
     let all: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -140,7 +140,7 @@ fn info_tells_what_a_surveyor_asks() {
     );
     assert_eq!(
         (&all[2]["kind"], &all[2]["photos"][1]["focal_px"][0]),
-        (&"cameras".into(), &1400.0.into())
+        (&"cameras".into(), &2900.5.into())
     );
     let spacing = all[0]["spacing_m"].as_f64().unwrap();
     // Neighbours lie 1 cm and 2 cm apart in x and y, and up to 97 mm in z.

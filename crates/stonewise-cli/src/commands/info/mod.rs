@@ -66,10 +66,9 @@ fn describe(path: &Path) -> Result<Described> {
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     match extension.as_str() {
         "toml" => project(path),
-        "xml" => cameras(path),
         "json" => json_file(path),
         "txt" | "bin" if matches!(&*name, "cameras" | "images" | "points3D") => cameras(path),
-        "csv" if is_camera_file(path) => cameras(path),
+        _ if is_camera_file(path) => cameras(path),
         _ if is_photo(path) => picture(path),
         _ => match CloudFormat::of(path) {
             Err(CloudError::UnknownFormat(_)) => cameras(path),
