@@ -129,7 +129,6 @@ def plan(
     out: _Path,
     parameters: str,
     force: bool,
-    batch_points: Optional[int],
     progress: _Progress,
     note: Optional[Callable[[str], Any]],
 ) -> Plan: ...

@@ -1,8 +1,9 @@
 """Runs on a cluster of machines, with Ray: ``pip install "stonewise[ray]"``.
 
-A run is cut into units of work, as ``stonewise plan`` prints them, and each unit is a task of Ray. Tasks get paths; points and photos go
-through the results folder, which all machines must see under the same path, as they must the survey. What is done is noted in that folder:
-whatever dies, the same call goes on from there, with or without Ray. Results have the same bytes as those of :func:`stonewise.run`.
+A run is cut into units of work, as ``stonewise plan`` prints them: steps, and single photos. Each unit is a task of Ray. Tasks get paths;
+points and photos go through the results folder, which all machines must see under the same path, as they must the survey. What is done is
+noted in that folder: whatever dies, the same call goes on from there, with or without Ray. Results have the same bytes as those of
+:func:`stonewise.run`.
 
 >>> import stonewise.ray                                                       # doctest: +SKIP
 >>> r = stonewise.ray.run("survey/stonewise.toml", out="/shared/results", address="auto")      # doctest: +SKIP
@@ -34,7 +35,6 @@ def run(
     *,
     address: Optional[str] = None,
     retries: int = 3,
-    batch_points: Optional[int] = None,
     progress: Union[bool, Progress] = False,
     force: bool = False,
     **parameters: Any,
@@ -46,7 +46,6 @@ def run(
     :param address: Of the cluster, as ``ray.init`` takes it: ``"auto"`` for the one that this machine belongs to; absent: one on this
         machine, for this call, unless Ray is connected already.
     :param retries: How often a unit is done again whose worker or machine died.
-    :param batch_points: Points of a cloud in one unit that labels or compares a batch of its tiles; absent: 4 million.
     :param progress: As in :func:`stonewise.run`; the work is counted in units.
     :param force: As in :func:`stonewise.run`.
     :param parameters: As in :func:`stonewise.run`.
@@ -59,7 +58,6 @@ def run(
         jobs,
         address=address,
         retries=retries,
-        batch_points=batch_points,
         progress=progress,
         force=force,
         **parameters,
@@ -71,7 +69,6 @@ def run_many(
     *,
     address: Optional[str] = None,
     retries: int = 3,
-    batch_points: Optional[int] = None,
     progress: Union[bool, Progress] = False,
     force: bool = False,
     **parameters: Any,
@@ -86,6 +83,8 @@ def run_many(
     >>> dams = ["ennepe", "brucher"]
     >>> stonewise.ray.run_many((f"{d}/stonewise.toml", f"/shared/{d}") for d in dams)      # doctest: +SKIP
     """
+    if "batch_points" in parameters:
+        raise _native.Error("batch_points: a unit is a whole step or one photo now: leave it out")
     pairs = [(os.path.abspath(project), os.path.abspath(out)) for project, out in jobs]
     is_ours = not ray.is_initialized()
     if is_ours and address is None:
@@ -95,7 +94,7 @@ def run_many(
         ray.init(address=address, log_to_driver=False)
     try:
         with listener(progress) as told:
-            errors = _Cluster(retries).do(pairs, to_json(parameters), force, batch_points, told)
+            errors = _Cluster(retries).do(pairs, to_json(parameters), force, told)
     finally:
         if is_ours:
             ray.shutdown()
@@ -143,7 +142,6 @@ class _Cluster:
         pairs: list[tuple[str, str]],
         parameters: str,
         force: bool,
-        batch_points: Optional[int],
         told: Optional[Progress],
     ) -> dict[str, str]:
         """Does all units of all projects; what went wrong, by folder of results."""
@@ -153,7 +151,7 @@ class _Cluster:
         try:
             for project, out in pairs:
                 try:
-                    plans.append(_native.plan(project, out, parameters, force, batch_points, None, log.info))
+                    plans.append(_native.plan(project, out, parameters, force, None, log.info))
                     self._submit(out, json.loads(plans[-1].json)["units"])
                 except _native.Error as error:
                     errors[out] = str(error)

@@ -18,9 +18,6 @@ from ray.cluster_utils import Cluster  # noqa: E402
 
 import stonewise.ray  # noqa: E402
 
-SMALL = {"batch_points": 20000}
-"""Points in a batch of tiles: the survey has several."""
-
 
 def contents(out: Path) -> dict[str, bytes]:
     """Result files but for those that hold times."""
@@ -31,7 +28,7 @@ def contents(out: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def tiled(survey) -> Path:
-    """The survey in small tiles, so that there are many units."""
+    """The survey in several tiles."""
     project = survey / "tiled.toml"
     project.write_text((survey / "stonewise.toml").read_text() + "\n[ingest]\nsize_m = 0.5\n")
     return project
@@ -79,10 +76,10 @@ def our_workers() -> list[int]:
 
 def test_a_cluster_makes_the_bytes_of_one_machine(cluster, tiled, expected, tmp_path):
     told = []
-    r = stonewise.ray.run(tiled, out=tmp_path / "out", progress=lambda *args: told.append(args), **SMALL)
+    r = stonewise.ray.run(tiled, out=tmp_path / "out", progress=lambda *args: told.append(args))
     assert contents(r.path) == expected
-    assert told[0][:2] == ("units", 0) and told[-1][1] == told[-1][2] > 20
-    again = stonewise.ray.run(tiled, out=tmp_path / "out", **SMALL)
+    assert told[0][:2] == ("units", 0) and told[-1][1] == told[-1][2] > 10
+    again = stonewise.ray.run(tiled, out=tmp_path / "out")
     assert contents(again.path) == expected
 
 
@@ -108,7 +105,7 @@ def test_workers_that_are_killed_and_a_machine_that_is_lost_change_nothing(clust
     remover = threading.Timer(3.0, lambda: cluster.remove_node(machine, allow_graceful=False))
     remover.start()
     try:
-        r = stonewise.ray.run(tiled, out=tmp_path / "out", retries=20, **SMALL)
+        r = stonewise.ray.run(tiled, out=tmp_path / "out", retries=20)
     finally:
         ended.set()
         killer.join()
@@ -122,13 +119,13 @@ def test_many_projects_and_one_that_fails(cluster, tiled, survey, expected, tmp_
     wrong.write_text(tiled.read_text().replace("size_m = 0.5", "size_n = 0.5"))
     jobs = [(wrong, tmp_path / "b"), (tiled, tmp_path / "a")]
     with pytest.raises(stonewise.Error, match="size_n") as raised:
-        stonewise.ray.run_many(jobs, **SMALL)
+        stonewise.ray.run_many(jobs)
     assert str(tmp_path / "b") in str(raised.value) and str(tmp_path / "a") not in str(raised.value)
     assert contents(tmp_path / "a") == expected
 
 
 def test_a_folder_in_use_is_left_alone(cluster, tiled, tmp_path):
-    holding = stonewise._native.plan(tiled, tmp_path / "out", "{}", False, None, None, None)
+    holding = stonewise._native.plan(tiled, tmp_path / "out", "{}", False, None, None)
     with pytest.raises(stonewise.Error, match="another run works in this folder"):
         stonewise.ray.run(tiled, out=tmp_path / "out")
     assert holding.json

@@ -263,10 +263,9 @@ pub struct PlanArgs {
     /// Only units of this rank: they need units of lower ranks only.
     #[arg(long, value_name = "N", requires = "ids")]
     pub rank: Option<usize>,
-    /// Points of a cloud in a unit that labels a batch of its tiles (default: 4 million). Results do not
-    /// depend on it.
-    #[arg(long, value_name = "N")]
-    pub batch_points: Option<u64>,
+    /// Of version 1 of the plan.
+    #[arg(long, hide = true)]
+    pub batch_points: Option<String>,
 }
 
 /// Arguments of `unit`.

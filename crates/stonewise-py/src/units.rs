@@ -6,7 +6,7 @@ use crate::error::{error, explained};
 use pyo3::prelude::*;
 use rayon::ThreadPoolBuilder;
 use std::path::PathBuf;
-use stonewise::{Coordinator, PlanOptions};
+use stonewise::Coordinator;
 
 /// A plan whose folder nobody else may use while this object lives.
 #[pyclass(frozen)]
@@ -25,25 +25,18 @@ impl Plan {
 
 /// Plans the units of a run; `parameters`: JSON of what replaces parameters of the project file.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)]
 pub fn plan(
     py: Python<'_>,
     project: PathBuf,
     out: PathBuf,
     parameters: &str,
     force: bool,
-    batch_points: Option<u64>,
     progress: Option<Py<PyAny>>,
     note: Option<Py<PyAny>>,
 ) -> PyResult<Plan> {
     let parameters = parameters_of(parameters)?;
-    let mut options = PlanOptions {
-        force,
-        ..PlanOptions::default()
-    };
-    options.batch_points = batch_points.unwrap_or(options.batch_points);
     let planned = attended(py, &Listeners { progress, note }, |progress| {
-        stonewise::plan(&project, &parameters, &out, &options, progress)
+        stonewise::plan(&project, &parameters, &out, force, progress)
     })?;
     Ok(Plan {
         coordinator: planned.map_err(explained)?,

@@ -47,8 +47,8 @@ pub use files::read_toml;
 pub use output::{OutputFolder, Owner, PREVIOUS_DIR, UNFINISHED_FILE};
 pub use part::Part;
 pub use pipeline::{
-    Comparison, Coordinator, PROJECT_STEP, PairSummary, Plan, PlanOptions, Summary, Unit, UnitDone, Until,
-    compare_clouds, do_unit, plan, run, tile_clouds,
+    Comparison, Coordinator, PROJECT_STEP, PairSummary, Plan, Summary, Unit, UnitDone, Until, compare_clouds,
+    do_unit, plan, run, tile_clouds,
 };
 pub use processor::processor_class;
 pub use report_params::{Language, ReportParams};

@@ -9,9 +9,8 @@ use crate::geometry::Bounds;
 use crate::params::Params;
 use crate::progress::Progress;
 use nalgebra::Point3;
-use std::ops::Range;
 
-/// M3C2 of two surveys at core points thinned from some tiles of the first one, in the order of the tiles.
+/// M3C2 of two surveys at core points thinned from the first one, in the order of its tiles.
 ///
 /// Normals are fitted to the first survey. A core point belongs to the tile that holds it, and every tile is
 /// read with as much surroundings as normals and cylinders need, so results do not depend on the tiles.
@@ -23,7 +22,6 @@ use std::ops::Range;
 pub fn m3c2_survey<A: TileSource, B: TileSource>(
     first: &A,
     second: &B,
-    tiles: Range<usize>,
     outward: &OutwardReference<'_>,
     params: &M3c2Params,
     progress: &dyn Progress,
@@ -36,28 +34,32 @@ pub fn m3c2_survey<A: TileSource, B: TileSource>(
         .max(cylinder_reach)
         .max(params.core_spacing_m * 3f64.sqrt());
     let mut field = ChangeField::default();
-    progress.each("M3C2", tiles, |tile| -> Result<(), CompareError> {
-        let mut points = tile_points(first, tile)?;
-        let own = points.len();
-        points.extend(points_around(first, &first.bounds(tile).grown(halo), Some(tile))?);
-        let positions: Vec<Point3<f64>> = thin_to_voxels(&points, params.core_spacing_m)
-            .into_iter()
-            .filter(|&i| i < own)
-            .map(|i| points[i])
-            .collect();
-        let first_index = GridIndex::new(&points, params.cylinder_radius_m);
-        drop(points);
-        let mut core = CorePoint::fitted(&first_index, &positions, params.normal_radius_m, outward);
-        core.retain(|point| point.normal.is_some());
-        if let Some(bounds) = Bounds::of(core.iter().map(|point| point.position)) {
-            let near = points_around(second, &bounds.grown(cylinder_reach), None)?;
-            let second_index = GridIndex::new(&near, params.cylinder_radius_m);
-            field
-                .points
-                .extend(m3c2(&first_index, &second_index, &core, params).points);
-        }
-        Ok(())
-    })?;
+    progress.each(
+        "M3C2",
+        0..first.tile_count(),
+        |tile| -> Result<(), CompareError> {
+            let mut points = tile_points(first, tile)?;
+            let own = points.len();
+            points.extend(points_around(first, &first.bounds(tile).grown(halo), Some(tile))?);
+            let positions: Vec<Point3<f64>> = thin_to_voxels(&points, params.core_spacing_m)
+                .into_iter()
+                .filter(|&i| i < own)
+                .map(|i| points[i])
+                .collect();
+            let first_index = GridIndex::new(&points, params.cylinder_radius_m);
+            drop(points);
+            let mut core = CorePoint::fitted(&first_index, &positions, params.normal_radius_m, outward);
+            core.retain(|point| point.normal.is_some());
+            if let Some(bounds) = Bounds::of(core.iter().map(|point| point.position)) {
+                let near = points_around(second, &bounds.grown(cylinder_reach), None)?;
+                let second_index = GridIndex::new(&near, params.cylinder_radius_m);
+                field
+                    .points
+                    .extend(m3c2(&first_index, &second_index, &core, params).points);
+            }
+            Ok(())
+        },
+    )?;
 
     Ok(field)
 }
@@ -182,8 +184,7 @@ mod tests {
             ..M3c2Params::default()
         };
         let outward = OutwardReference::Towards(&[Point3::new(8.0, 1.0, 1.0)]);
-        let tiles = 0..first.tile_count();
-        let field = m3c2_survey(first, second, tiles, &outward, &params, &Silent).unwrap();
+        let field = m3c2_survey(first, second, &outward, &params, &Silent).unwrap();
         let mut all = field.points;
         all.sort_by(|a, b| {
             let key = |c: &ChangePoint| [c.position.z, c.position.y, c.position.x];

@@ -1,6 +1,5 @@
 //! Depth maps of photos by splatting.
 
-use super::bytes::{Reader, Writer};
 use super::depth_bounds::DepthBounds;
 use super::frustum::Cone;
 use super::photo_frame::{CHUNK, PhotoFrame, Shown, chunk_of};
@@ -36,37 +35,6 @@ impl SplatDepth {
             map: DepthMap::filled(side(view.camera.width), side(view.camera.height), f32::INFINITY),
             scale,
         }
-    }
-
-    /// An empty map, for where no depth is read.
-    pub(super) fn none() -> Self {
-        Self {
-            map: DepthMap::filled(0, 0, f32::INFINITY),
-            scale: 1.0,
-        }
-    }
-
-    /// Encodes the map as bytes, for [`Self::decode`].
-    pub(super) fn encode(&self) -> Vec<u8> {
-        let mut out = Writer::default();
-        out.f64(self.scale);
-        out.u32(self.map.width());
-        out.u32(self.map.height());
-        self.map.data().iter().for_each(|&depth| out.f32(depth));
-        out.0
-    }
-
-    pub(super) fn decode(bytes: &[u8]) -> Result<Self, TransferError> {
-        let mut bytes = Reader(bytes);
-        let scale = bytes.f64()?;
-        let (width, height) = (bytes.u32()?, bytes.u32()?);
-        let depths = bytes.0.chunks_exact(4);
-        let depths = depths.map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-        let map = DepthMap::from_vec(width, height, depths.collect());
-        Ok(Self {
-            map: map.ok_or(TransferError::Damaged)?,
-            scale,
-        })
     }
 
     /// Lets a point cover the square of half width `radius_px` (photo pixels) around its pixel.

@@ -52,9 +52,6 @@ pub enum TransferError {
         /// What went wrong.
         source: Source,
     },
-    /// What was kept between the passes cannot be read.
-    #[error("what was prepared for the labels is damaged: prepare it again")]
-    Damaged,
     /// The stored labels do not belong to this cloud.
     #[error("tile {tile} has {points} points but {labels} labels: label the cloud again")]
     LabelCount {

@@ -1,7 +1,6 @@
 //! Parts of a stone that are cut off from its main body.
 
-use super::bytes::{Reader, Writer};
-use super::{TransferError, TransferParams};
+use super::TransferParams;
 use crate::geometry::{CellMap, CellSet, cell_of, cells_around};
 use nalgebra::Point3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,8 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(super) type Voxel = [i64; 3];
 
 /// Where each stone has points, counted in voxels across tiles.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Occupancy {
+pub(super) struct Occupancy {
     voxel_m: f64,
     /// Points in each voxel of each stone.
     counts: CellMap<u32, CellMap<Voxel, u32>>,
@@ -32,7 +30,7 @@ pub(super) struct Removal {
 
 impl Occupancy {
     /// Without points; `voxel_m`: side of the voxels, metres.
-    pub fn new(voxel_m: f64) -> Self {
+    pub(super) fn new(voxel_m: f64) -> Self {
         Self {
             voxel_m,
             counts: CellMap::default(),
@@ -59,52 +57,6 @@ impl Occupancy {
         if let Some(((stone, voxel), count)) = counted {
             *self.counts.entry(stone).or_default().entry(voxel).or_default() += count;
         }
-    }
-
-    /// The points of other tiles, too.
-    pub fn merge(&mut self, other: Self) {
-        for (stone, voxels) in other.counts {
-            for (voxel, count) in voxels {
-                self.add(Some(((stone, voxel), count)));
-            }
-        }
-    }
-
-    /// Encodes the counts as bytes, for [`Self::decode`]; equal counts give equal bytes.
-    pub fn encode(&self) -> Vec<u8> {
-        let mut out = Writer::default();
-        out.f64(self.voxel_m);
-        let stones: BTreeMap<_, _> = self.counts.iter().collect();
-        out.list(stones.into_iter(), |out, (stone, voxels)| {
-            out.u32(*stone);
-            let sorted: BTreeMap<_, _> = voxels.iter().collect();
-            out.list(sorted.into_iter(), |out, (voxel, count)| {
-                voxel.iter().for_each(|&v| out.i64(v));
-                out.u32(*count);
-            });
-        });
-        out.0
-    }
-
-    /// From bytes.
-    ///
-    /// # Errors
-    /// They are not those of an occupancy.
-    pub fn decode(bytes: &[u8]) -> Result<Self, TransferError> {
-        let mut bytes = Reader(bytes);
-        let voxel_m = bytes.f64()?;
-        let counts = bytes.list(|bytes| {
-            let stone = bytes.u32()?;
-            let voxels = bytes.list(|bytes| {
-                let voxel = [bytes.i64()?, bytes.i64()?, bytes.i64()?];
-                Ok((voxel, bytes.u32()?))
-            })?;
-            Ok((stone, voxels.into_iter().collect()))
-        })?;
-        Ok(Self {
-            voxel_m,
-            counts: counts.into_iter().collect(),
-        })
     }
 
     /// Finds islands smaller than a share of their stone's largest part, and stones with too few points.
@@ -185,22 +137,6 @@ fn parts(mut voxels: BTreeMap<Voxel, u32>) -> Vec<Part> {
 mod tests {
     use super::*;
 
-    fn halved(voxels: &CellMap<Voxel, u32>, half: u32) -> CellMap<Voxel, u32> {
-        voxels.iter().map(|(voxel, n)| (*voxel, (n + half) / 2)).collect()
-    }
-
-    /// Every voxel's points shared out between two.
-    fn split(whole: &Occupancy) -> [Occupancy; 2] {
-        [0, 1].map(|half| Occupancy {
-            voxel_m: whole.voxel_m,
-            counts: whole
-                .counts
-                .iter()
-                .map(|(stone, voxels)| (*stone, halved(voxels, half)))
-                .collect(),
-        })
-    }
-
     #[test]
     fn a_far_speck_goes_a_second_half_stays_and_a_tiny_stone_goes() {
         let mut occupancy = Occupancy::new(0.04);
@@ -216,11 +152,6 @@ mod tests {
         patch(1, 0.5, 15);
         patch(1, 1.0, 3);
         patch(2, 2.0, 4);
-        let (mut whole, halves) = (Occupancy::new(0.04), split(&occupancy));
-        for half in halves {
-            whole.merge(Occupancy::decode(&half.encode()).unwrap());
-        }
-        assert_eq!(whole, occupancy);
         let removal = occupancy.removal(&TransferParams::default());
         assert_eq!(removal.islands, BTreeMap::from([(1, (1, 9))]));
         assert_eq!(removal.stones, BTreeMap::from([(2, 16)]));

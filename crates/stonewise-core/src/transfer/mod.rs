@@ -12,7 +12,6 @@ mod area;
 mod assign;
 mod atoms;
 mod audit;
-mod bytes;
 mod carry;
 mod change_labels;
 mod depth;
@@ -20,7 +19,6 @@ mod depth_bounds;
 mod drop_stones;
 mod each_tile;
 mod edit;
-mod election;
 mod error;
 mod face;
 mod frustum;
@@ -50,15 +48,11 @@ pub use carry::{
 };
 pub use drop_stones::drop_stones;
 pub use edit::{EditEffect, EditReport, EditedWall, LabelEdit, NoEffect, edit_labels};
-pub use election::Election;
 pub use error::TransferError;
-pub use islands::Occupancy;
 pub use labels::{LabelStore, MemoryLabels, TileLabels};
 pub use panels::{StoneReliefs, panels};
 pub use params::TransferParams;
 pub use photo_stones::{PhotoStones, photo_stones};
 pub use relief::photo_relief;
 pub use stones::{StoneParams, build_stones};
-pub use transfer_labels::{
-    KeptParts, PhotoVotes, PreparedTransfer, StoneInstances, Transfer, finish_transfer, transfer_labels,
-};
+pub use transfer_labels::{PhotoVotes, StoneInstances, Transfer, transfer_labels};

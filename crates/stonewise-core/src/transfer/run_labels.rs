@@ -27,22 +27,14 @@ const BLOCK_PX: usize = 16;
 const MIXED: u32 = u32::MAX;
 
 impl RunLabels {
-    /// The labels of a photo that is not read.
-    pub(super) fn none() -> Self {
-        Self {
-            width: 0,
-            rows: vec![0],
-            runs: Vec::new(),
-            parts: Vec::new(),
-            blocks: Vec::new(),
-        }
-    }
-
     pub(super) fn new(image: &LabelImage) -> Self {
         let width = image.width();
         let mut labels = Self {
             width,
-            ..Self::none()
+            rows: vec![0],
+            runs: Vec::new(),
+            parts: Vec::new(),
+            blocks: Vec::new(),
         };
         let rows = image.data().chunks_exact(width.max(1) as usize);
         for (y, row) in rows.enumerate() {

@@ -1,8 +1,7 @@
 //! Local spacing, noise and orientation of a tile's surface.
 
-use super::bytes::{Reader, Writer};
+use super::TransferParams;
 use super::neighbourhood::{Members, Neighbourhood};
-use super::{TransferError, TransferParams};
 use crate::cloud::Cloud;
 use crate::geometry::{Bounds, CellMap, cell_of, floor};
 use crate::statistics::upper_median;
@@ -122,44 +121,6 @@ impl SurfaceCells {
             .into_iter()
             .filter_map(group)
             .collect()
-    }
-
-    /// Encodes the cells as bytes, for [`Self::decode`].
-    pub(super) fn encode(&self) -> Vec<u8> {
-        let mut out = Writer::default();
-        self.origin.iter().for_each(|&v| out.f64(v));
-        out.f64(self.cell_m);
-        out.list(self.keys.iter().zip(&self.surfaces), |out, (key, surface)| {
-            key.iter().for_each(|&v| out.u32(v as u32));
-            surface.normal.iter().for_each(|&v| out.f32(v));
-            out.f32(surface.spacing_m);
-            out.f32(surface.noise_m);
-            out.u32(surface.points);
-        });
-        out.0
-    }
-
-    pub(super) fn decode(bytes: &[u8]) -> Result<Self, TransferError> {
-        let mut bytes = Reader(bytes);
-        let origin = Point3::new(bytes.f64()?, bytes.f64()?, bytes.f64()?);
-        let cell_m = bytes.f64()?;
-        let cells = bytes.list(|bytes| {
-            let key = [bytes.i32()?, bytes.i32()?, bytes.i32()?];
-            let surface = LocalSurface {
-                normal: Vector3::new(bytes.f32()?, bytes.f32()?, bytes.f32()?),
-                spacing_m: bytes.f32()?,
-                noise_m: bytes.f32()?,
-                points: bytes.u32()?,
-            };
-            Ok((key, surface))
-        })?;
-        let (keys, surfaces) = cells.into_iter().unzip();
-        Ok(Self {
-            origin,
-            cell_m,
-            keys,
-            surfaces,
-        })
     }
 
     fn block(&self, key: &[i32; 3]) -> [i64; 3] {

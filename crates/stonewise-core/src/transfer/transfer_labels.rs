@@ -2,14 +2,10 @@
 
 use super::assign::assign;
 use super::atoms::gather_atoms;
-use super::depth::SplatDepth;
-use super::election::Election;
-use super::frustum::Cone;
 use super::islands::{Occupancy, Removal};
 use super::majority::{Decision, decide};
 use super::overlap::Overlaps;
 use super::run_labels::RunLabels;
-use super::surface_cells::SurfaceCells;
 use super::tracks::group;
 use super::visibility::Observer;
 use super::vote::{Ballot, Electorate};
@@ -23,7 +19,6 @@ use crate::raster::LabelImage;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 /// The instances that make up a stone.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -85,214 +80,36 @@ where
     E: std::error::Error + Send + Sync + 'static,
     S: LabelStore,
 {
-    let prepared = PreparedTransfer::new(tiles, views, mask, params, progress)?;
-    let occupancy = prepared.label(tiles, 0..tiles.tile_count(), store, progress)?;
-    finish_transfer(
-        tiles,
-        views,
-        &prepared.election,
-        occupancy,
-        store,
-        params,
-        progress,
-    )
-}
+    params.check()?;
+    let observer = Observer::new(tiles, load_masks(views, mask, progress)?, params, progress)?;
+    let atoms = gather_atoms(tiles, &observer, params.sample_m, progress)?;
+    let overlaps = Overlaps::of(&atoms);
+    let pairs = assign(&overlaps, params.min_iou);
+    let groups = group(&overlaps, &pairs, params.min_iou);
+    let (electorate, decisions) = decide(&overlaps, &groups, &atoms, params);
+    drop(atoms);
 
-/// The photos after all passes but the last, ready to label any tile.
-///
-/// [`transfer_labels`] in pieces: [`Self::new`] once, [`Self::label`] for ranges of tiles, and
-/// [`finish_transfer`] once all tiles are labelled. Between these, [`Self::election`] and the depth maps and
-/// surfaces can be kept as bytes; results are the same to the last bit.
-pub struct PreparedTransfer<'a> {
-    observer: Observer<'a>,
-    election: Election,
-    params: &'a TransferParams,
-}
+    let names = Names::of(&electorate, &overlaps, observer.views());
+    let mut occupancy = Occupancy::new(params.island_link_m.max(3.0 * observer.spacing_m()));
+    let load = |tile| tiles.load(tile).map_err(|e| TransferError::tile(tile, e));
+    progress.each_prepared("labels", 0..tiles.tile_count(), load, |tile, cloud| {
+        let candidates = observer.candidates(&tiles.bounds(tile));
+        let labels = label_tile(tile, &cloud, &observer, &candidates, &electorate, &names);
+        let labelled = labels.stone.iter().enumerate().filter(|s| *s.1 != 0);
+        occupancy.add_all(labelled.map(|(i, &stone)| (stone, cloud.world(i))));
+        store
+            .write(tile, &labels)
+            .map_err(|e| TransferError::labels(tile, e))
+    })?;
 
-/// How the parts of a [`PreparedTransfer`] that were kept are read.
-pub trait KeptParts {
-    /// Why they cannot be read.
-    type Error: std::error::Error + Send + Sync + 'static;
-
-    /// Bytes of the depth map of a photo, by its position among those with a mask.
-    ///
-    /// # Errors
-    /// They cannot be read.
-    fn depth(&self, photo: usize) -> Result<Vec<u8>, Self::Error>;
-    /// Bytes of the surface of a tile.
-    ///
-    /// # Errors
-    /// They cannot be read.
-    fn surface(&self, tile: usize) -> Result<Vec<u8>, Self::Error>;
-}
-
-impl<'a> PreparedTransfer<'a> {
-    /// Goes through the cloud for depth maps and for the overlaps of instances, and decides about these.
-    /// Arguments as of [`transfer_labels`].
-    ///
-    /// # Errors
-    /// As [`transfer_labels`].
-    pub fn new<T, E>(
-        tiles: &T,
-        views: &'a [View],
-        mask: impl FnMut(ImageId) -> Result<Option<LabelImage>, E>,
-        params: &'a TransferParams,
-        progress: &dyn Progress,
-    ) -> Result<Self, TransferError>
-    where
-        T: TileSource,
-        E: std::error::Error + Send + Sync + 'static,
-    {
-        params.check()?;
-        let masked = load_masks(views, mask, progress)?;
-        let of_view: BTreeMap<ImageId, u32> = views.iter().map(|v| v.image).zip(0..).collect();
-        let positions = masked.iter().filter_map(|(view, _)| of_view.get(&view.image));
-        let positions = positions.copied().collect();
-        let observer = Observer::new(tiles, masked, params, progress)?;
-        let atoms = gather_atoms(tiles, &observer, params.sample_m, progress)?;
-        let overlaps = Overlaps::of(&atoms);
-        let pairs = assign(&overlaps, params.min_iou);
-        let groups = group(&overlaps, &pairs, params.min_iou);
-        let (electorate, decisions) = decide(&overlaps, &groups, &atoms, params);
-        let ballots = electorate.ballots().to_vec();
-        let election = Election {
-            masked: positions,
-            ballots,
-            decisions,
-            spacing_m: observer.spacing_m(),
-            overlaps,
-        };
-
-        Ok(Self {
-            observer,
-            election,
-            params,
-        })
-    }
-
-    /// Restores the transfer for some tiles from what was kept; only photos that may show them are read.
-    ///
-    /// # Errors
-    /// A mask that fails; what was kept cannot be read, or is damaged.
-    pub fn restore<T, K, E>(
-        tiles: &T,
-        range: &Range<usize>,
-        views: &'a [View],
-        election: Election,
-        kept: &K,
-        mut mask: impl FnMut(ImageId) -> Result<Option<LabelImage>, E>,
-        params: &'a TransferParams,
-    ) -> Result<Self, TransferError>
-    where
-        T: TileSource,
-        K: KeptParts,
-        E: std::error::Error + Send + Sync + 'static,
-    {
-        let views = election.views(views)?;
-        let (mut labels, mut depths) = (Vec::new(), Vec::new());
-        for (photo, view) in views.iter().enumerate() {
-            let cone = Cone::of(view);
-            if !range.clone().any(|tile| cone.touches(&tiles.bounds(tile))) {
-                labels.push(RunLabels::none());
-                depths.push(SplatDepth::none());
-                continue;
-            }
-            let of_photo = |source| TransferError::Mask {
-                photo: view.name.clone(),
-                source,
-            };
-            let image = mask(view.image).map_err(|e| of_photo(Box::new(e)))?;
-            labels.push(RunLabels::new(&image.ok_or(TransferError::Damaged)?));
-            let depth = kept.depth(photo).map_err(|e| of_photo(Box::new(e)))?;
-            depths.push(SplatDepth::decode(&depth)?);
-        }
-
-        let surface = |tile| {
-            let bytes = kept.surface(tile).map_err(|e| TransferError::tile(tile, e))?;
-            SurfaceCells::decode(&bytes)
-        };
-        let surfaces = range.clone().map(surface).collect::<Result<_, _>>()?;
-        Ok(Self {
-            observer: Observer::of(views, labels, depths, (surfaces, range.start), params),
-            election,
-            params,
-        })
-    }
-
-    /// What was decided.
-    pub fn election(&self) -> &Election {
-        &self.election
-    }
-
-    /// Number of photos that have masks.
-    pub fn photo_count(&self) -> usize {
-        self.observer.views().len()
-    }
-
-    /// Bytes of the depth map of a photo, by its position among those with a mask.
-    pub fn depth(&self, photo: usize) -> Option<Vec<u8>> {
-        self.observer.depth(photo).map(SplatDepth::encode)
-    }
-
-    /// Bytes of the surface of a tile.
-    pub fn surface(&self, tile: usize) -> Option<Vec<u8>> {
-        self.observer.surface(tile).map(SurfaceCells::encode)
-    }
-
-    /// Labels some tiles; where the stones are in them.
-    ///
-    /// # Errors
-    /// A tile or label store that fails, interruption.
-    pub fn label<T: TileSource, S: LabelStore>(
-        &self,
-        tiles: &T,
-        range: Range<usize>,
-        store: &mut S,
-        progress: &dyn Progress,
-    ) -> Result<Occupancy, TransferError> {
-        let electorate = self.election.electorate(self.params.border_weight);
-        let names = Names::of(&electorate, &self.election.overlaps, self.observer.views());
-        let link_m = self.params.island_link_m.max(3.0 * self.election.spacing_m);
-        let mut occupancy = Occupancy::new(link_m);
-        let load = |tile| tiles.load(tile).map_err(|e| TransferError::tile(tile, e));
-        progress.each_prepared("labels", range, load, |tile, cloud| {
-            let candidates = self.observer.candidates(&tiles.bounds(tile));
-            let labels = label_tile(tile, &cloud, &self.observer, &candidates, &electorate, &names);
-            let labelled = labels.stone.iter().enumerate().filter(|s| *s.1 != 0);
-            occupancy.add_all(labelled.map(|(i, &stone)| (stone, cloud.world(i))));
-            store
-                .write(tile, &labels)
-                .map_err(|e| TransferError::labels(tile, e))
-        })?;
-        Ok(occupancy)
-    }
-}
-
-/// Takes islands and small stones away once all tiles are labelled; `occupancy`: where the stones are in all
-/// of them.
-///
-/// # Errors
-/// A tile or label store that fails, interruption.
-pub fn finish_transfer<T: TileSource, S: LabelStore>(
-    tiles: &T,
-    views: &[View],
-    election: &Election,
-    occupancy: Occupancy,
-    store: &mut S,
-    params: &TransferParams,
-    progress: &dyn Progress,
-) -> Result<Transfer, TransferError> {
-    let electorate = election.electorate(params.border_weight);
-    let names = Names::of(&electorate, &election.overlaps, &election.views(views)?);
     let removal = occupancy.removal(params);
     remove(tiles, &removal, store, progress)?;
-    let mut audit = names.decisions(&election.decisions);
-    let stones = names.stones(&electorate, &removal);
+    let mut audit = names.decisions(&decisions);
     audit.extend(names.removals(&electorate, &removal));
     Ok(Transfer {
-        stones,
+        stones: names.stones(&electorate, &removal),
         audit,
-        photos: photo_votes(views, election),
+        photos: photo_votes(views, observer.views(), &overlaps),
     })
 }
 
@@ -509,23 +326,17 @@ pub(super) fn count_photos(instances: &[(ImageId, InstanceId)]) -> u32 {
     photos.len() as u32
 }
 
-fn photo_votes(views: &[View], election: &Election) -> Vec<PhotoVotes> {
-    let position: BTreeMap<u32, u32> = election.masked.iter().copied().zip(0..).collect();
-    (0..)
-        .zip(views)
-        .map(|(i, view)| {
-            let masked = position.get(&i);
-            let instances = election
-                .overlaps
-                .instances
-                .iter()
-                .filter(|i| masked == Some(&i.photo))
-                .count();
-            PhotoVotes {
-                photo: view.image,
-                masked: masked.is_some(),
-                instances: instances as u32,
-            }
-        })
-        .collect()
+/// `masked`: the views that have masks, in the order of the overlaps' photos.
+fn photo_votes(views: &[View], masked: &[&View], overlaps: &Overlaps) -> Vec<PhotoVotes> {
+    let position: BTreeMap<ImageId, u32> = masked.iter().map(|view| view.image).zip(0..).collect();
+    let votes = |view: &View| {
+        let masked = position.get(&view.image);
+        let instances = overlaps.instances.iter().filter(|i| masked == Some(&i.photo));
+        PhotoVotes {
+            photo: view.image,
+            masked: masked.is_some(),
+            instances: instances.count() as u32,
+        }
+    };
+    views.iter().map(votes).collect()
 }

@@ -39,9 +39,8 @@ pub(super) struct Observer<'a> {
     labels: Vec<RunLabels>,
     depths: Vec<SplatDepth>,
     bounds: Vec<DepthBounds>,
-    /// Surfaces of the tiles from `first_tile` on.
+    /// Of each tile.
     surfaces: Vec<SurfaceCells>,
-    first_tile: usize,
     params: &'a TransferParams,
     /// Cosine of the steepest incidence at which a photo votes.
     least_cosine: f64,
@@ -57,16 +56,15 @@ impl<'a> Observer<'a> {
     ) -> Result<Self, TransferError> {
         let (views, labels): (Vec<&View>, Vec<RunLabels>) = masked.into_iter().unzip();
         let (depths, surfaces) = splat_all(tiles, &views, params, progress)?;
-        Ok(Self::of(views, labels, depths, (surfaces, 0), params))
+        Ok(Self::of(views, labels, depths, surfaces, params))
     }
 
-    /// From depth maps and surfaces that were made before; `surfaces`: those of consecutive tiles,
-    /// and the number of the first. What no tile of these needs may be empty.
-    pub(super) fn of(
+    /// `labels`, `depths`: of each view; `surfaces`: of each tile.
+    fn of(
         views: Vec<&'a View>,
         labels: Vec<RunLabels>,
         depths: Vec<SplatDepth>,
-        (surfaces, first_tile): (Vec<SurfaceCells>, usize),
+        surfaces: Vec<SurfaceCells>,
         params: &'a TransferParams,
     ) -> Self {
         Self {
@@ -81,20 +79,9 @@ impl<'a> Observer<'a> {
             labels,
             depths,
             surfaces,
-            first_tile,
             params,
             least_cosine: params.max_incidence_rad.cos(),
         }
-    }
-
-    /// The depth map of a photo.
-    pub(super) fn depth(&self, photo: usize) -> Option<&SplatDepth> {
-        self.depths.get(photo)
-    }
-
-    /// The local surface of a tile.
-    pub(super) fn surface(&self, tile: usize) -> Option<&SurfaceCells> {
-        self.surfaces.get(tile.checked_sub(self.first_tile)?)
     }
 
     /// The photos that have masks.
@@ -129,7 +116,7 @@ impl<'a> Observer<'a> {
         candidates: &[u32],
         note: impl Fn(&mut R, u32, &[Sighting]) + Sync,
     ) -> Vec<R> {
-        let groups = self.surfaces[tile - self.first_tile].groups_of(cloud, chosen);
+        let groups = self.surfaces[tile].groups_of(cloud, chosen);
         let of_group = |(seen, found): &mut (Vec<Seen>, Vec<Sighting>), group: &SurfaceGroup| {
             let may_vote = |p: &u32| self.may_vote(*p as usize, group);
             let candidates = candidates.iter().copied().filter(may_vote);
@@ -461,7 +448,7 @@ mod tests {
             views.iter().collect(),
             views.iter().map(|_| labels()).collect(),
             views.iter().map(|v| SplatDepth::new(v, 1.0)).collect(),
-            (surfaces, 0),
+            surfaces,
             &params,
         );
         let (mut left_out, mut seen) = (0, 0);

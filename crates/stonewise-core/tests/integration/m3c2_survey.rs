@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_core::change::{M3c2Params, OutwardReference, m3c2_survey};
-use stonewise_core::cloud::{Cloud, MemoryTiles, TileSource};
+use stonewise_core::cloud::{Cloud, MemoryTiles};
 use stonewise_core::evaluate::{EvaluationParams, MotionField, MotionScore, MovedTiles, score_change};
 use stonewise_core::progress::Silent;
 
@@ -29,8 +29,8 @@ fn score(folder: &Path, motion: &MotionField) -> MotionScore {
     let [first, second] = [1, 2].map(|e| tiles(&folder.join(format!("epoch{e}/cloud_tls.laz"))));
     let moved = MovedTiles::new(&second, motion);
     let outward = OutwardReference::Direction(Vector3::x());
-    let (tiles, params) = (0..first.tile_count(), M3c2Params::default());
-    let mut field = m3c2_survey(&first, &moved, tiles, &outward, &params, &Silent).unwrap();
+    let params = M3c2Params::default();
+    let mut field = m3c2_survey(&first, &moved, &outward, &params, &Silent).unwrap();
     let on_wall =
         |p: &Point3<f64>| (p.x + 0.2 * p.z).abs() < 0.12 && p.y.abs() < 1.9 && p.z > 0.1 && p.z < 2.9;
     field.points.retain(|p| on_wall(&p.position));

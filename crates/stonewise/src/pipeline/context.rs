@@ -9,7 +9,7 @@ use crate::project::Project;
 use crate::results::names::WORK_DIR;
 use crate::results::records::StepTime;
 use crate::storage::step::{Key, StepDir};
-use crate::storage::store::{Keeps, Name, Origin, Scope, StepStore};
+use crate::storage::store::{Keeps, Origin, StepStore};
 use crate::warnings::{Warning, Warnings};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -72,11 +72,10 @@ impl<'a> Context<'a> {
     pub fn of_unit(
         project: &'a Project,
         output: &'a OutputFolder,
-        scope: Scope,
         digests: BTreeMap<PathBuf, String>,
         progress: &'a dyn Progress,
     ) -> Result<Self> {
-        let store = StepStore::of_unit(&output.path().join(WORK_DIR), scope, digests)?;
+        let store = StepStore::of_unit(&output.path().join(WORK_DIR), digests)?;
         let context = Self::with_store(project, output.path(), Arc::new(store), progress)?;
         Ok(Self {
             output: Some(output),
@@ -112,51 +111,40 @@ impl<'a> Context<'a> {
     }
 
     /// Does a step, or takes the files and warnings that the same step left earlier.
-    pub fn step<'n>(
+    pub fn step(
         &self,
-        name: impl Into<Name<'n>>,
+        name: &str,
         key: Key,
         make: impl FnOnce(&StepDir, &Warnings) -> Result<()>,
     ) -> Result<StepDir> {
-        self.step_publishing(name, key, &[], make)
+        self.step_in(name, name, key, &[], make)
     }
 
-    /// Does a step as [`Self::step`] does, for a step that makes files outside its folder too.
-    pub fn step_publishing<'n>(
+    /// Does a step as [`Self::step`] does, for one that shares a folder with others, or that makes files outside
+    /// its folder, too.
+    pub fn step_in(
         &self,
-        name: impl Into<Name<'n>>,
+        folder: &str,
+        name: &str,
         key: Key,
         published: &[PathBuf],
         make: impl FnOnce(&StepDir, &Warnings) -> Result<()>,
     ) -> Result<StepDir> {
         self.progress.check()?;
-        let (name, started) = (name.into(), Clock::start());
-        let (dir, origin) = self.store.step(name, key, published, |dir| {
+        let started = Clock::start();
+        let (dir, origin) = self.store.step(folder, key, published, |dir| {
             self.enter();
             let warnings = Warnings::default();
             make(dir, &warnings)?;
             write_json(&dir.file(WARNINGS), &warnings.sorted())
         })?;
         if let Origin::MadeAgain(why) = &origin {
-            self.progress
-                .note(&format!("step {} was done again: {why}", name.step));
+            self.progress.note(&format!("step {name} was done again: {why}"));
         }
         let warnings: Vec<Warning> = read_json(&dir.file(WARNINGS))?;
         warnings.into_iter().for_each(|w| self.warnings.push(w));
-        self.record(name.step, started, origin == Origin::Found);
+        self.record(name, started, origin == Origin::Found);
         Ok(dir)
-    }
-
-    /// Does a part of the step `whole`, or takes the files that it left earlier: a unit of work that another
-    /// process may have done.
-    pub fn part(
-        &self,
-        whole: (&str, &Key),
-        part: &str,
-        make: impl FnOnce(&StepDir) -> Result<()>,
-    ) -> Result<StepDir> {
-        self.progress.check()?;
-        self.store.part(whole, part, make)
     }
 
     /// Does a piece of work that keeps nothing between runs, and notes its time.

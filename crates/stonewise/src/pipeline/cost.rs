@@ -3,34 +3,21 @@
 use crate::error::Result;
 use crate::project::Project;
 use crate::storage::tiles::most_records;
-use std::path::PathBuf;
 use stonewise_core::epoch::{EpochId, Epochs};
 
 /// What a unit takes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Cost {
     /// Threads that it makes good use of.
     pub cores: u32,
     /// Memory beyond that of the program at rest.
     pub bytes: u64,
-    /// Files of the survey that it reads.
-    pub inputs: Vec<PathBuf>,
 }
 
 impl Cost {
-    /// The cost of a unit that reads no file of the survey.
+    /// The cost of a unit.
     pub const fn of(cores: u32, bytes: u64) -> Self {
-        Self {
-            cores,
-            bytes,
-            inputs: Vec::new(),
-        }
-    }
-
-    /// Sets the files of the survey that the unit reads.
-    pub fn reading(self, inputs: impl IntoIterator<Item = PathBuf>) -> Self {
-        let inputs = inputs.into_iter().collect();
-        Self { inputs, ..self }
+        Self { cores, bytes }
     }
 }
 

@@ -2,7 +2,6 @@
 
 use super::context::Context;
 use super::cost::{Cost, Sizes};
-use super::part::Part;
 use super::until::Until;
 use crate::error::Result;
 use crate::project::Project;
@@ -30,8 +29,8 @@ pub struct Step {
     pub applies: fn(&Project, EpochId) -> bool,
     /// What it takes as a unit of a plan; `None`: the last unit does it.
     pub cost: Option<fn(&Sizes, EpochId) -> Cost>,
-    /// The parts that other processes may do.
-    pub parts: Option<Parts>,
+    /// Its photos, where each is a unit of its own.
+    pub photos: Option<Photos>,
     /// Does it.
     pub make: fn(&Run, EpochId) -> Result<()>,
 }
@@ -96,25 +95,14 @@ impl Need {
     }
 }
 
-/// The parts of a step.
-pub struct Parts {
-    /// What they are.
-    pub kind: PartKind,
+/// The photos of a step, which other processes may do one by one before it.
+pub struct Photos {
+    /// How many there are.
+    pub count: fn(&Project, EpochId) -> Result<usize>,
     /// What each takes as a unit.
     pub cost: fn(&Sizes, EpochId) -> Cost,
-    /// Does one, or gathers them.
-    pub make: fn(&Run, EpochId, Part) -> Result<()>,
-}
-
-/// What the parts of a step are.
-#[derive(Clone, Copy)]
-pub enum PartKind {
-    /// Photos, as many as the function counts.
-    Photos(fn(&Project, EpochId) -> Result<usize>),
-    /// Batches of the tiles of the step's epoch, after a part that all of them need.
-    PreparedTiles,
-    /// Batches of the tiles of the reference.
-    ReferenceTiles,
+    /// Does one, counted from 0.
+    pub make: fn(&Run, EpochId, usize) -> Result<()>,
 }
 
 impl Step {
@@ -127,7 +115,7 @@ impl Step {
         wanted: |_| true,
         applies: |_, _| true,
         cost: None,
-        parts: None,
+        photos: None,
         make: |_, _| Ok(()),
     };
 }

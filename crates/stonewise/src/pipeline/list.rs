@@ -87,7 +87,7 @@ pub fn agenda(project: &Project, until: Until) -> Agenda {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::graph::{Of, PartKind};
+    use crate::pipeline::graph::Of;
     use crate::settings::Settings;
 
     /// A project of three epochs, of which these have masks.
@@ -174,10 +174,10 @@ mod tests {
                 About::Epoch => "epoch",
                 About::Later => "later epoch",
             };
-            let parts = match step.parts.as_ref().map(|parts| &parts.kind) {
-                Some(PartKind::Photos(_)) => "photos",
-                Some(_) => "batches of tiles",
-                None => "–",
+            let unit = match (&step.cost, &step.photos) {
+                (_, Some(_)) => "yes, and each photo",
+                (Some(_), None) => "yes",
+                (None, None) => "no",
             };
             let cells = [
                 format!("`{}`", step.name),
@@ -187,8 +187,7 @@ mod tests {
                 },
                 about.to_owned(),
                 needs(step),
-                if step.cost.is_some() { "yes" } else { "no" }.to_owned(),
-                parts.to_owned(),
+                unit.to_owned(),
                 runs(step),
             ];
             format!("| {} |\n", cells.join(" | "))

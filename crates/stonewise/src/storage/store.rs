@@ -1,6 +1,6 @@
 //! Steps that keep their results and resume, in the folders of a store.
 
-use super::step::{DONE, Key, Look, State, StepDir, discard, path_digest};
+use super::step::{Key, Look, State, StepDir, discard, path_digest};
 use crate::error::{Error, Result};
 use crate::files::create_results_folder;
 use std::collections::{BTreeMap, BTreeSet};
@@ -30,60 +30,16 @@ pub enum Origin {
     MadeAgain(String),
 }
 
-/// The unit of a plan that a process does: steps that are other units are other processes' business.
-#[derive(Clone, Debug, Default)]
-pub struct Scope {
-    /// The unit.
-    pub unit: String,
-    /// All units of the plan.
-    pub units: BTreeSet<String>,
-}
-
-/// What a step is called, and the folder in which its versions lie.
-#[derive(Clone, Copy, Debug)]
-pub struct Name<'a> {
-    /// Its name, in records and messages; a unit of a plan has the same.
-    pub step: &'a str,
-    /// Steps that share a folder find what any of them has made under the same key.
-    pub folder: &'a str,
-}
-
-impl<'a> From<&'a str> for Name<'a> {
-    fn from(name: &'a str) -> Self {
-        Self {
-            step: name,
-            folder: name,
-        }
-    }
-}
-
-impl<'a> From<&'a String> for Name<'a> {
-    fn from(name: &'a String) -> Self {
-        name.as_str().into()
-    }
-}
-
 /// The folder that holds the folders of all steps: that of each version is named after its key.
 pub struct StepStore {
     folder: PathBuf,
     keeps: Keeps,
-    /// `None`: this process does everything.
-    scope: Option<Scope>,
+    look: Look,
     /// One for each folder in which somebody works.
     turns: Mutex<BTreeMap<PathBuf, Arc<Mutex<()>>>>,
     digests: Mutex<BTreeMap<PathBuf, String>>,
-    /// Steps whose files this process has compared with their digests or made itself.
-    sound: Mutex<BTreeSet<(PathBuf, String)>>,
-    /// Folders of the steps that are this unit's business, relative to that of the store.
-    own: Mutex<BTreeSet<PathBuf>>,
-}
-
-/// A step: which, where, and what it depends on.
-struct Place<'a> {
-    name: &'a str,
-    path: PathBuf,
-    key: Key,
-    is_part: bool,
+    /// Folders of the steps whose files this process has compared with their digests or made itself.
+    sound: Mutex<BTreeSet<PathBuf>>,
 }
 
 impl StepStore {
@@ -93,45 +49,38 @@ impl StepStore {
         Ok(Self {
             folder: folder.to_path_buf(),
             keeps,
-            scope: None,
+            look: Look::Digests,
             turns: Mutex::default(),
             digests: Mutex::default(),
             sound: Mutex::default(),
-            own: Mutex::default(),
         })
     }
 
-    /// The store of a run of which this process does one unit; `digests`: of the inputs, as the plan lists
-    /// them.
-    pub fn of_unit(folder: &Path, scope: Scope, digests: BTreeMap<PathBuf, String>) -> Result<Self> {
+    /// The store of a run of which this process does one unit: what others have made is only looked at, and none
+    /// of it is removed. `digests`: of the inputs, as the plan lists them.
+    pub fn of_unit(folder: &Path, digests: BTreeMap<PathBuf, String>) -> Result<Self> {
         Ok(Self {
-            scope: Some(scope),
+            look: Look::Lengths,
             digests: Mutex::new(digests),
-            ..Self::new(folder, Keeps::Newest)?
+            ..Self::new(folder, Keeps::Every)?
         })
     }
 
     /// Does a step with `make`, unless its files are there under this key, as they were left.
     ///
+    /// `folder`: that of all versions; steps that share it find what any of them has made under the same key.
     /// `published`: files outside the step's folder that it makes too. Of several threads that start the same
     /// step one does it and the others wait: call it from threads that no thread pool lends out, or they may
     /// wait for themselves. Cost of a step that is taken over: its files are read once to compare their
     /// digests.
-    pub fn step<'n>(
+    pub fn step(
         &self,
-        name: impl Into<Name<'n>>,
+        folder: &str,
         key: Key,
         published: &[PathBuf],
         make: impl FnOnce(&StepDir) -> Result<()>,
     ) -> Result<(StepDir, Origin)> {
-        let name = name.into();
-        let place = Place {
-            name: name.step,
-            path: self.path(name.folder, &key),
-            key,
-            is_part: false,
-        };
-        self.do_at(place, published, make)
+        self.do_at(self.path(folder, &key), key, published, make)
     }
 
     /// Makes a part of a step: a step of its own, which lies beside the whole until that is done.
@@ -141,81 +90,48 @@ impl StepStore {
         part: &str,
         make: impl FnOnce(&StepDir) -> Result<()>,
     ) -> Result<StepDir> {
-        let place = Place {
-            name: &format!("{whole}.{part}"),
-            path: self.parts(whole, key).join(part),
-            key: Key::new("part", &part, &[key.as_str()]),
-            is_part: true,
-        };
-        Ok(self.do_at(place, &[], make)?.0)
+        let path = self.parts(whole, key).join(part);
+        let key = Key::new("part", &part, &[key.as_str()]);
+        Ok(self.do_at(path, key, &[], make)?.0)
     }
 
     /// Removes the parts of a step that is done.
     pub fn remove_parts(&self, whole: &str, key: &Key) -> Result<()> {
-        let parts = self.parts(whole, key);
-        match fs::remove_dir_all(&parts) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                Err(Error::io("removing what is gathered", &parts)(error))
-            }
-            _ => Ok(()),
-        }
+        discard(&self.parts(whole, key))
     }
 
     fn do_at(
         &self,
-        place: Place,
+        path: PathBuf,
+        key: Key,
         published: &[PathBuf],
         make: impl FnOnce(&StepDir) -> Result<()>,
     ) -> Result<(StepDir, Origin)> {
-        let Place {
-            name,
-            path,
-            key,
-            is_part,
-        } = place;
-        self.note_own(name, &path);
         let turn = {
             let mut turns = self.turns.lock().unwrap_or_else(PoisonError::into_inner);
             Arc::clone(turns.entry(path.clone()).or_default())
         };
         let _mine = turn.lock().unwrap_or_else(PoisonError::into_inner);
-        let identity = (path.clone(), key.as_str().to_owned());
         let dir = StepDir::at(path, key);
 
-        if self.sound().contains(&identity) && published.is_empty() {
+        if self.sound().contains(dir.path()) && published.is_empty() {
             return Ok((dir, Origin::Found));
         }
-        let look = match self.scope {
-            Some(_) => Look::Lengths,
-            None => Look::Digests,
-        };
-        let origin = match dir.state(published, look) {
+        let origin = match dir.state(published, self.look) {
             State::Done => Origin::Found,
             State::Unfinished => Origin::Made,
             State::Damaged(why) => Origin::MadeAgain(why),
         };
 
         if origin != Origin::Found {
-            self.refuse_others_work(name)?;
-            if self.keeps == Keeps::Newest && self.scope.is_none() && !is_part {
+            if self.keeps == Keeps::Newest {
                 self.remove_versions(dir.path().parent(), Some(dir.path()))?;
             }
             dir.replace(published, make)?;
         }
 
-        self.sound().insert(identity);
+        self.sound().insert(dir.path().to_path_buf());
         Ok((dir, origin))
-    }
-
-    /// A process that does one unit leaves the others alone; steps that are in no plan it may do itself.
-    fn refuse_others_work(&self, name: &str) -> Result<()> {
-        match &self.scope {
-            Some(scope) if scope.unit != name && scope.units.contains(name) => Err(Error::UnitFirst {
-                unit: scope.unit.clone(),
-                first: vec![name.to_owned()],
-            }),
-            _ => Ok(()),
-        }
     }
 
     /// Removes all versions of steps that this process has neither made nor found; only for the last process
@@ -235,7 +151,7 @@ impl StepStore {
         let Some(entries) = folder.and_then(|f| fs::read_dir(f).ok()) else {
             return Ok(());
         };
-        let used: BTreeSet<PathBuf> = self.sound().iter().map(|(path, _)| path.clone()).collect();
+        let used = self.sound().clone();
         for entry in entries.flatten() {
             let path = entry.path();
             let whole = path.with_extension("");
@@ -247,22 +163,6 @@ impl StepStore {
         Ok(())
     }
 
-    fn note_own(&self, name: &str, path: &Path) {
-        let is_own = |scope: &Scope| scope.unit == name || !scope.units.contains(name);
-        if self.scope.as_ref().is_some_and(is_own) {
-            let path = path.strip_prefix(&self.folder).unwrap_or(path).to_path_buf();
-            self.own
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .insert(path);
-        }
-    }
-
-    /// Folders of the steps that this process did or found for its unit, relative to that of the store.
-    pub fn own_folders(&self) -> BTreeSet<PathBuf> {
-        self.own.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-
     fn path(&self, folder: &str, key: &Key) -> PathBuf {
         self.folder.join(folder).join(&key.as_str()[..VERSION_DIGITS])
     }
@@ -271,13 +171,13 @@ impl StepStore {
         self.path(whole, key).with_extension("parts")
     }
 
-    fn sound(&self) -> MutexGuard<'_, BTreeSet<(PathBuf, String)>> {
+    fn sound(&self) -> MutexGuard<'_, BTreeSet<PathBuf>> {
         self.sound.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Whether this process does one unit of a plan.
     pub fn is_of_unit(&self) -> bool {
-        self.scope.is_some()
+        self.look == Look::Lengths
     }
 
     /// Digest of an input file or folder, read once.
@@ -307,15 +207,6 @@ const VERSION_DIGITS: usize = 16;
 fn is_version(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.len() == VERSION_DIGITS && name.bytes().all(|b| b.is_ascii_hexdigit())
-}
-
-/// Whether the files of a step or of a part of one are still there, or those of the step that gathered the
-/// part; `folder`: as [`StepStore::own_folders`] has it, in that of the store.
-pub fn is_kept(store: &Path, folder: &Path) -> bool {
-    let is_done = |path: &Path| path.join(DONE).exists();
-    let path = store.join(folder);
-    let whole = path.parent().map(|parts| parts.with_extension(""));
-    is_done(&path) || whole.is_some_and(|whole| is_version(&whole) && is_done(&whole))
 }
 
 #[cfg(test)]
@@ -455,63 +346,34 @@ mod tests {
     #[test]
     fn a_new_version_replaces_what_this_run_has_not_used_and_nothing_that_is_not_ours() {
         let work = tempfile::tempdir().unwrap();
-        let make = |store: &StepStore, name: Name, version: u32| {
+        let make = |store: &StepStore, version: u32| {
             let key = Key::new("match", &version, &[]);
             store
-                .step(name, key, &[], |dir| write_text(&dir.file("x"), "x"))
+                .step("match", key, &[], |dir| write_text(&dir.file("x"), "x"))
                 .unwrap()
-        };
-        let name = Name::from("match");
-        let of_join = Name {
-            step: "join-match",
-            folder: "match",
         };
         let count = || fs::read_dir(work.path().join("match")).unwrap().count();
         let store = StepStore::new(work.path(), Keeps::Newest).unwrap();
-        make(&store, of_join, 0);
-        make(&store, name, 1);
-        // What another step has made under the same key is found.
-        assert_eq!(make(&store, name, 0).1, Origin::Found);
+        make(&store, 0);
+        make(&store, 1);
+        assert_eq!(make(&store, 0).1, Origin::Found);
         // The name of a version has sixteen digits; that of somebody else's folder may have sixteen letters.
         let others = ["match/thesis.tex", "match/measured-by-hand"].map(|name| work.path().join(name));
         fs::write(&others[0], "x").unwrap();
         fs::create_dir(&others[1]).unwrap();
-        fs::write(others[1].join(DONE), "x").unwrap();
+        fs::write(others[1].join("done"), "x").unwrap();
         assert_eq!(count(), 4);
 
         let later = StepStore::new(work.path(), Keeps::Newest).unwrap();
-        assert_eq!(make(&later, of_join, 0).1, Origin::Found);
-        make(&later, name, 2);
+        assert_eq!(make(&later, 0).1, Origin::Found);
+        make(&later, 2);
         assert_eq!(count(), 4);
-        assert_eq!(make(&later, name, 2).1, Origin::Found);
+        assert_eq!(make(&later, 2).1, Origin::Found);
 
         let last = StepStore::new(work.path(), Keeps::Newest).unwrap();
-        make(&last, name, 2);
+        make(&last, 2);
         last.remove_unused().unwrap();
         assert_eq!(count(), 3);
         assert!(others.iter().all(|path| path.exists()));
-    }
-
-    #[test]
-    fn a_unit_does_its_own_step_and_names_the_one_that_is_missing() {
-        let work = tempfile::tempdir().unwrap();
-        let scope = Scope {
-            unit: "b".to_owned(),
-            units: ["a", "b", "c.1"].map(str::to_owned).into(),
-        };
-        let store = StepStore::of_unit(work.path(), scope, BTreeMap::new()).unwrap();
-        let key = |name: &str| Key::new(name, &0, &[]);
-        let refused = store
-            .step("a", key("a"), &[], |_| Ok(()))
-            .unwrap_err()
-            .to_string();
-        assert!(refused.contains("unit b needs a: do it first"), "{refused}");
-        assert!(store.part(("c", &key("c")), "1", |_| Ok(())).is_err());
-        for name in ["b", "in-no-plan"] {
-            assert_eq!(
-                store.step(name, key(name), &[], |_| Ok(())).unwrap().1,
-                Origin::Made
-            );
-        }
     }
 }

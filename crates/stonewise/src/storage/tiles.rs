@@ -15,7 +15,6 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::fs;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use stonewise_core::cloud::{Cloud, TileSource};
@@ -86,12 +85,6 @@ impl DiskTiles {
         self.tiles.iter().map(|t| t.points).sum()
     }
 
-    /// The tiles of one of `count` batches with about as many points each, in order; a batch may be empty.
-    pub fn batch(&self, number: usize, count: usize) -> Range<usize> {
-        let points: Vec<u64> = self.tiles.iter().map(|t| t.points).collect();
-        start_of_batch(&points, number, count)..start_of_batch(&points, number + 1, count)
-    }
-
     /// File-name stem of a tile, for files that go beside it.
     pub fn name(&self, tile: usize) -> &str {
         &self.tiles[tile].name
@@ -106,24 +99,6 @@ impl DiskTiles {
             index: table.required("index")?.to_vec(),
         })
     }
-}
-
-/// The first tile of a batch: those before it hold at most as many of all points as the batches before it
-/// should.
-fn start_of_batch(points: &[u64], number: usize, count: usize) -> usize {
-    if number >= count {
-        return points.len();
-    }
-    let all: u64 = points.iter().sum();
-    let share = (u128::from(all) * number as u128 / count as u128) as u64;
-    let mut before = 0;
-    points
-        .iter()
-        .take_while(|&&n| {
-            before += n;
-            before <= share
-        })
-        .count()
 }
 
 /// Origin of each point of a tile: its number in the epoch's list of sources, and its time since that source began,
@@ -319,7 +294,7 @@ pub fn cut_into_tiles(
         .collect::<Result<Vec<_>>>()?;
 
     write_json(&step.file(SOURCES), &sources.finish())?;
-    write_index(step, &entries)?;
+    write_json(&step.file("tiles.json"), &entries)?;
     Ok(invalid)
 }
 
@@ -528,28 +503,4 @@ fn write_tile(
         bounds,
         points: cloud.len() as u64,
     })
-}
-
-fn write_index(step: &StepDir, entries: &[TileEntry]) -> Result<()> {
-    write_json(&step.file("tiles.json"), &entries)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn batches_hold_every_tile_once_and_about_as_many_points() {
-        let points: Vec<u64> = (0..40).map(|i| 100 + 37 * (i % 7)).collect();
-        let all: u64 = points.iter().sum();
-        for count in [1, 3, 8, 40, 100] {
-            let starts: Vec<usize> = (0..=count).map(|b| start_of_batch(&points, b, count)).collect();
-            assert_eq!((starts[0], starts[count]), (0, 40));
-            for pair in starts.windows(2) {
-                let held: u64 = points[pair[0]..pair[1]].iter().sum();
-                // A tile more or less at either end.
-                assert!(held <= all / count as u64 + 2 * 322, "{count} batches: {pair:?}");
-            }
-        }
-    }
 }

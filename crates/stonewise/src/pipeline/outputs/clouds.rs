@@ -67,7 +67,8 @@ fn write_clouds(
     let outputs: Vec<PathBuf> = names.iter().map(|name| context.out.join(name)).collect();
     let motions = rows.map_or_else(BTreeMap::new, motions);
     let key = Key::new("clouds", &format!("{motions:?}"), &[labelled.key.as_str()]);
-    context.step_publishing(&format!("clouds-{id}"), key, &outputs, |_, _| {
+    let name = format!("clouds-{id}");
+    context.step_in(&name, &name, key, &outputs, |_, _| {
         // Of two processes that do the same unit the slower one must not take away what the other has
         // finished.
         let removes = !context.store.is_of_unit();

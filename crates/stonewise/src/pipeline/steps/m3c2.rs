@@ -1,22 +1,18 @@
 //! M3C2 between two epochs of a project.
 
 use crate::error::Result;
-use crate::pipeline::context::Context;
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{About, Need, PartKind, Parts, Run, Step};
-use crate::pipeline::part::Part;
-use crate::pipeline::steps::ingest::{INGEST, Ingested};
+use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::steps::ingest::INGEST;
 use crate::pipeline::steps::segment::SEGMENT;
 use crate::pipeline::until::Until;
 use crate::results::records::Datum;
 use crate::storage::step::{Key, StepDir};
 use nalgebra::{Matrix3, Point3, Vector3};
-use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 use stonewise_core::change::{ChangeField, ChangePoint, M3c2Params, OutwardReference, m3c2_survey};
-use stonewise_core::cloud::TileSource;
-use stonewise_core::epoch::{EpochId, Pair};
+use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::View;
 use stonewise_core::registration::observers::EpochErrors;
 use stonewise_io::table::{Table, read_parquet, write_parquet};
@@ -36,12 +32,8 @@ pub static M3C2: Step = Step {
         Need::reference(&SEGMENT),
     ],
     wanted: |until| until >= Until::Compared,
-    cost: Some(|sizes, _| Cost::of(1, sizes.cloud_bytes(EpochId::REFERENCE))),
-    parts: Some(Parts {
-        kind: PartKind::ReferenceTiles,
-        cost: |_, _| Cost::of(4, 512 << 20),
-        make: compare,
-    }),
+    // Tiles with their surroundings, and the core points.
+    cost: Some(|sizes, _| Cost::of(4, (512 << 20) + sizes.cloud_bytes(EpochId::REFERENCE))),
     make: |run, epoch| run.compared(epoch).map(drop),
     ..Step::PLAIN
 };
@@ -50,39 +42,24 @@ impl Run<'_> {
     /// The comparison of the clouds of a later epoch, on disk.
     pub fn compared(&self, later: EpochId) -> Result<Arc<StepDir>> {
         self.once(&M3C2, later, || {
-            let centres = self.reference_cameras()?;
+            let photos = self.segmented(EpochId::REFERENCE)?;
+            let centres: Vec<Point3<f64>> = photos.views.iter().map(View::centre).collect();
             m3c2(self, later, &OutwardReference::Towards(&centres))
         })
-    }
-
-    fn reference_cameras(&self) -> Result<Vec<Point3<f64>>> {
-        let photos = self.segmented(EpochId::REFERENCE)?;
-        Ok(photos.views.iter().map(View::centre).collect())
-    }
-}
-
-/// Does a part of the step, or gathers all of them.
-fn compare(run: &Run, later: EpochId, part: Part) -> Result<()> {
-    let centres = run.reference_cameras()?;
-    let outward = OutwardReference::Towards(&centres);
-    let clouds = run.clouds(later)?;
-    let comparison = Comparison::new(run.context, clouds.each_ref().map(|c| &**c), later, &outward);
-    match part {
-        Part::Whole(count) => comparison.gather(count),
-        Part::Tiles(number, count) => comparison.batch(number, count).map(drop),
-        Part::Prepare | Part::Photo(_) => Ok(()),
     }
 }
 
 /// Compares two epochs along the normals of the reference, in whatever direction is outwards.
 pub fn m3c2(run: &Run, later: EpochId, outward: &OutwardReference) -> Result<StepDir> {
-    let clouds = run.clouds(later)?;
-    let comparison = Comparison::new(run.context, clouds.each_ref().map(|c| &**c), later, outward);
-    let all = 0..clouds.first.tiles.tile_count();
-    run.context
-        .step(&comparison.name, comparison.key.clone(), |step, _| {
-            write_field(&step.file(FIELD), &comparison.field(all)?)
-        })
+    let (clouds, params) = (run.clouds(later)?, &run.context.project.settings.m3c2);
+    let motions = clouds.each_ref().map(|e| &e.tiles.motion).into_array();
+    let keys = clouds.each_ref().map(|e| e.step.key().as_str()).into_array();
+    let key = Key::new("m3c2", &(params, motions), &keys);
+    run.context.step(&format!("m3c2-{later}"), key, |step, _| {
+        let tiles = clouds.each_ref().map(|e| &e.tiles);
+        let field = m3c2_survey(tiles.first, tiles.later, outward, params, run.context.progress)?;
+        write_field(&step.file(FIELD), &field)
+    })
 }
 
 /// The comparison that the step left.
@@ -117,70 +94,6 @@ pub fn with_datum(
         let variance = point.normal.dot(&(covariance * point.normal)).max(0.0);
         variance.sqrt().hypot(point.normal.dot(&error))
     })
-}
-
-/// The comparison of two epochs, for processes that share it.
-struct Comparison<'a> {
-    context: &'a Context<'a>,
-    epochs: Pair<&'a Ingested>,
-    outward: &'a OutwardReference<'a>,
-    name: String,
-    key: Key,
-}
-
-impl<'a> Comparison<'a> {
-    /// The comparison of a later epoch with the reference.
-    fn new(
-        context: &'a Context<'a>,
-        epochs: Pair<&'a Ingested>,
-        later: EpochId,
-        outward: &'a OutwardReference<'a>,
-    ) -> Self {
-        let params = &context.project.settings.m3c2;
-        let motions = epochs.map(|e| &e.tiles.motion).into_array();
-        let keys = epochs.map(|e| e.step.key().as_str()).into_array();
-        Self {
-            context,
-            epochs,
-            outward,
-            name: format!("m3c2-{later}"),
-            key: Key::new("m3c2", &(params, motions), &keys),
-        }
-    }
-
-    fn field(&self, tiles: Range<usize>) -> Result<ChangeField> {
-        Ok(m3c2_survey(
-            &self.epochs.first.tiles,
-            &self.epochs.later.tiles,
-            tiles,
-            self.outward,
-            &self.context.project.settings.m3c2,
-            self.context.progress,
-        )?)
-    }
-
-    /// The core points of one of `count` batches of tiles of the first epoch.
-    fn batch(&self, number: usize, count: usize) -> Result<StepDir> {
-        let whole = (self.name.as_str(), &self.key);
-        self.context
-            .part(whole, &Part::Tiles(number, count).name(), |part| {
-                let tiles = self.epochs.first.tiles.surveyed.batch(number, count);
-                write_field(&part.file(FIELD), &self.field(tiles)?)
-            })
-    }
-
-    /// Takes the core points of all batches together.
-    fn gather(&self, count: usize) -> Result<()> {
-        self.context.step(&self.name, self.key.clone(), |step, _| {
-            let mut field = ChangeField::default();
-            for number in 0..count {
-                let batch = read_field(&self.batch(number, count)?.file(FIELD))?;
-                field.points.extend(batch.points);
-            }
-            write_field(&step.file(FIELD), &field)
-        })?;
-        self.context.store.remove_parts(&self.name, &self.key)
-    }
 }
 
 fn write_field(path: &Path, field: &ChangeField) -> Result<()> {

@@ -6,7 +6,6 @@ use crate::pipeline::context::Context;
 use crate::pipeline::graph::Run;
 use crate::pipeline::steps::label::Labelled;
 use crate::storage::step::Key;
-use crate::storage::store::Name;
 use nalgebra::Point3;
 use std::sync::Arc;
 use stonewise_core::cloud::{Cloud, TileSource};
@@ -25,16 +24,18 @@ impl Run<'_> {
     pub fn matches(&self, name: &str, labelled: Pair<&Labelled>, later: EpochId) -> Result<Arc<MatchReport>> {
         let params = &self.context.project.settings.r#match;
         let key = Key::new("match", params, &labelled.map(|l| l.key.as_str()).into_array());
-        let name = Name {
-            step: &format!("{name}-{later}"),
-            folder: &format!("match-{later}"),
-        };
-        self.known(key.clone().as_str(), || find(self.context, name, key, labelled))
+        let names = [format!("match-{later}"), format!("{name}-{later}")];
+        self.known(key.clone().as_str(), || find(self.context, names, key, labelled))
     }
 }
 
-fn find(context: &Context, name: Name, key: Key, labelled: Pair<&Labelled>) -> Result<MatchReport> {
-    let step = context.step(name, key, |step, _| {
+fn find(
+    context: &Context,
+    [folder, name]: [String; 2],
+    key: Key,
+    labelled: Pair<&Labelled>,
+) -> Result<MatchReport> {
+    let step = context.step_in(&folder, &name, key, &[], |step, _| {
         let (_, footprints) = survey(context, labelled.first)?;
         let (covered, footprints_2) = survey(context, labelled.later)?;
         let overlap = footprint_overlap(&footprints, &footprints_2);

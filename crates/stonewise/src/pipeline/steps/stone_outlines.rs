@@ -5,7 +5,6 @@ use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::results::{StoneOutline, write_outlines};
 use crate::storage::step::{Key, StepDir};
-use crate::storage::store::Name;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -16,11 +15,7 @@ use stonewise_core::transfer::TileLabels;
 /// Makes the outlines of the reference's stones in a step of this name; those of the same labels once.
 pub fn make_outlines(context: &Context, first: &Labelled, name: &str) -> Result<StepDir> {
     let key = Key::new("outlines", &(), &[first.key.as_str()]);
-    let name = Name {
-        step: name,
-        folder: "outlines",
-    };
-    context.step(name, key, |step, _| {
+    context.step_in("outlines", name, key, &[], |step, _| {
         write_outlines(step.path(), &stone_outlines(context, first)?)
     })
 }

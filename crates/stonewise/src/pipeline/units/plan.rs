@@ -12,9 +12,8 @@ use crate::pipeline::steps::check::CHECK;
 use crate::pipeline::until::Until;
 use crate::processor_class;
 use crate::project::Project;
-use crate::results::names::{RUN, WORK_DIR};
+use crate::results::names::RUN;
 use crate::storage::step::{Key, code_version};
-use crate::storage::store::is_kept;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::fs;
@@ -23,13 +22,13 @@ use stonewise_core::epoch::EpochId;
 use stonewise_core::progress::Progress;
 
 /// Version of the document.
-const VERSION: u32 = 1;
+const VERSION: u64 = 2;
 
 /// The units of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// Version of this document.
-    pub version: u32,
+    pub version: u64,
     /// Digest of everything that the results depend on: inputs, parameters, program.
     pub id: String,
     /// Version of stonewise.
@@ -42,33 +41,11 @@ pub struct Plan {
     pub project: PathBuf,
     /// Parameters that replace those of the project file.
     pub parameters: Map<String, Value>,
-    /// Points of a cloud in a batch of tiles, about.
-    pub batch_points: u64,
     /// Whether the work goes on in spite of findings against it.
     pub forced: bool,
     pub(super) inputs: Vec<PlannedInput>,
     /// The units, each after those that it needs.
     pub units: Vec<Unit>,
-}
-
-/// How a run is planned.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PlanOptions {
-    /// Points of a cloud in a batch of tiles, about. Results do not depend on it.
-    pub batch_points: u64,
-    /// Write into a folder that holds other things, and go on in spite of findings against the survey.
-    pub force: bool,
-}
-
-impl Default for PlanOptions {
-    /// Batches of 4 million points: at 3 million points and photos a second and core, and ten photos a point,
-    /// 14 seconds; much longer than it takes to start a process, and 50 batches for a cloud of 200 million.
-    fn default() -> Self {
-        Self {
-            batch_points: 4_000_000,
-            force: false,
-        }
-    }
 }
 
 /// Holds a results folder while others do the units of its plan: no run and no other plan may begin there.
@@ -82,7 +59,8 @@ pub struct Coordinator {
 /// Plans the units of a run in a folder and notes the plan there.
 ///
 /// Units that were done for the same plan stay done; results of an earlier run lie aside until the last unit
-/// is done. `parameters` replace those of the project file. Every input is read once for its digest.
+/// is done. `parameters` replace those of the project file; `force`: write into a folder that holds other things,
+/// and go on in spite of findings against the survey. Every input is read once for its digest.
 ///
 /// # Errors
 /// A project file that is wrong, an input that cannot be read, a survey that cannot be right, a folder that
@@ -91,18 +69,18 @@ pub fn plan(
     project: &Path,
     parameters: &Map<String, Value>,
     out: &Path,
-    options: &PlanOptions,
+    force: bool,
     progress: &dyn Progress,
 ) -> Result<Coordinator> {
     // Units are done by processes in other folders.
     let path = std::path::absolute(project).map_err(Error::io("finding", project))?;
     let project = Project::read(&path)?.with_parameters(parameters)?;
-    let folder = OutputFolder::of_project(out, &project, options.force)?;
+    let folder = OutputFolder::of_project(out, &project, force)?;
     let mut plan = {
         let mut context = Context::new(&project, &folder, progress)?;
-        context.forced = Some(options.force);
+        context.forced = Some(force);
         (CHECK.make)(&Run::new(&context, Until::Reported), EpochId::REFERENCE)?;
-        Plan::of(&context, parameters, options)?
+        Plan::of(&context, parameters, force)?
     };
     plan.take_over(out)?;
     if plan.units.iter().any(|unit| !unit.done) {
@@ -116,18 +94,14 @@ pub fn plan(
 }
 
 impl Plan {
-    fn of(context: &Context, parameters: &Map<String, Value>, options: &PlanOptions) -> Result<Self> {
+    fn of(context: &Context, parameters: &Map<String, Value>, force: bool) -> Result<Self> {
         let project = context.project;
         let inputs = inputs_of(context)?;
-        let units = units_of(project, options.batch_points)?;
+        let units = units_of(project)?;
         let program = code_version();
         let digests: Vec<&str> = inputs.iter().map(|i| i.blake3.as_str()).collect();
         let paths: Vec<&PathBuf> = inputs.iter().map(|i| &i.path).collect();
-        let id = Key::new(
-            "plan",
-            &(&project.settings, paths, &units, options.force),
-            &digests,
-        );
+        let id = Key::new("plan", &(&project.settings, paths, &units, force), &digests);
         Ok(Self {
             version: VERSION,
             id: id.as_str().to_owned(),
@@ -136,25 +110,19 @@ impl Plan {
             processor: processor_class().to_owned(),
             project: project.path.clone(),
             parameters: parameters.clone(),
-            batch_points: options.batch_points,
-            forced: options.force,
+            forced: force,
             inputs,
             units,
         })
     }
 
-    /// Notes which units were done for the same plan earlier and have their files still; other receipts go.
+    /// Notes which units were done for the same plan earlier; other receipts go.
     fn take_over(&mut self, out: &Path) -> Result<()> {
         if Self::read(out).ok().is_none_or(|earlier| earlier.id != self.id) {
             return withdraw_all(out);
         }
-        let work = out.join(WORK_DIR);
         for unit in &mut self.units {
-            let receipt = Receipt::read(out, &self.id, &unit.id);
-            unit.done = receipt.is_some_and(|r| r.folders.iter().all(|folder| is_kept(&work, folder)));
-            if !unit.done {
-                withdraw(out, &unit.id)?;
-            }
+            unit.done = Receipt::read(out, &self.id, &unit.id).is_some();
         }
         // The last unit writes the tables.
         let is_finished = out.join(RUN).exists() && !out.join(UNFINISHED_FILE).exists();
@@ -178,11 +146,12 @@ impl Plan {
         };
         let text = fs::read(&path)
             .map_err(|_| none("no plan here: run `stonewise plan PROJECT --out DIR` first"))?;
-        let plan: Self = serde_json::from_slice(&text)
-            .map_err(|_| none("the plan cannot be read: run `stonewise plan` again"))?;
-        match plan.version {
-            VERSION => Ok(plan),
-            _ => Err(none("the plan has another version: run `stonewise plan` again")),
+        let plan: Value = serde_json::from_slice(&text).unwrap_or_default();
+        if let Some(version) = plan["version"].as_u64().filter(|version| *version != VERSION) {
+            return Err(none(&format!(
+                "the plan is of version {version}, this program does plans of version {VERSION}: run `stonewise plan` again"
+            )));
         }
+        serde_json::from_value(plan).map_err(|_| none("the plan cannot be read: run `stonewise plan` again"))
     }
 }

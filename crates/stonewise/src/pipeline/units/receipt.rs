@@ -6,7 +6,7 @@ use crate::pipeline::clock::{Clock, peak_memory_bytes};
 use crate::results::names::WORK_DIR;
 use crate::results::records::StepTime;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -29,26 +29,17 @@ pub(super) struct Receipt {
     pub processor_seconds: Option<f64>,
     /// Highest memory of the process, bytes; absent where the system does not report it.
     pub peak_memory_bytes: Option<u64>,
-    /// Folders of the files that it left, relative to that of all steps.
-    pub folders: BTreeSet<PathBuf>,
 }
 
 impl Receipt {
     /// Notes that a unit is done which began with the clock.
-    pub fn write(
-        out: &Path,
-        plan: &str,
-        unit: &str,
-        clock: &Clock,
-        folders: BTreeSet<PathBuf>,
-    ) -> Result<()> {
+    pub fn write(out: &Path, plan: &str, unit: &str, clock: &Clock) -> Result<()> {
         let receipt = Self {
             unit: unit.to_owned(),
             plan: plan.to_owned(),
             seconds: clock.wall_seconds(),
             processor_seconds: clock.processor_seconds(),
             peak_memory_bytes: peak_memory_bytes(),
-            folders,
         };
         let path = out.join(receipt_file(unit));
         let folder = path.parent().unwrap_or(out);
@@ -101,8 +92,7 @@ fn remove(path: &Path, how: impl FnOnce(&Path) -> std::io::Result<()>) -> Result
     }
 }
 
-/// Times of the steps whose units are done, by the name of the step; those of a step that was done in parts
-/// are added up.
+/// Times of the steps whose units are done, by the name of the step; those of its photos are added.
 pub(super) fn times<'a>(
     out: &Path,
     plan: &str,

@@ -9,15 +9,13 @@ use crate::output::OutputFolder;
 use crate::pipeline::Summary;
 use crate::pipeline::clock::Clock;
 use crate::pipeline::context::Context;
-use crate::pipeline::graph::{PartKind, Run, Task};
+use crate::pipeline::graph::{Run, Task};
 use crate::pipeline::list::tasks;
-use crate::pipeline::part::Part;
 use crate::pipeline::run::run_in;
 use crate::pipeline::until::Until;
 use crate::processor_class;
 use crate::project::Project;
 use crate::storage::step::code_version;
-use crate::storage::store::Scope;
 use std::path::Path;
 use stonewise_core::progress::Progress;
 
@@ -81,12 +79,8 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
 
     refuse_too_early(out, &plan, unit)?;
     let clock = Clock::start();
-    let scope = Scope {
-        unit: id.to_owned(),
-        units: plan.units.iter().map(|u| u.id.clone()).collect(),
-    };
-    let (summary, folders) = {
-        let mut context = Context::of_unit(&project, &folder, scope, digests, progress)?;
+    let summary = {
+        let mut context = Context::of_unit(&project, &folder, digests, progress)?;
         context.forced = Some(plan.forced);
         context.unit_times = times(out, &plan.id, plan.units.iter().map(|u| u.id.as_str()));
         let is_last = plan.units.last().is_some_and(|last| last.id == id);
@@ -97,7 +91,7 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
         if is_last {
             context.store.remove_unused()?;
         }
-        (summary, context.store.own_folders())
+        summary
     };
 
     if summary.is_some() {
@@ -106,7 +100,7 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
         folder.finish_results(&project, true)?;
     }
 
-    Receipt::write(out, &plan.id, id, &clock, folders)?;
+    Receipt::write(out, &plan.id, id, &clock)?;
     Ok(UnitDone {
         project,
         was_done: false,
@@ -137,16 +131,8 @@ fn do_step(context: &Context, unit: &Unit) -> Result<()> {
             message: format!("this build of stonewise has no step {name:?}: run `stonewise plan` again"),
         });
     };
-    match (&step.parts, unit.part, unit.parts) {
-        (Some(parts), Some(number), Some(count)) => {
-            let part = match parts.kind {
-                PartKind::Photos(_) => Part::Photo(number),
-                PartKind::PreparedTiles | PartKind::ReferenceTiles => Part::Tiles(number, count),
-            };
-            (parts.make)(&run, epoch, part)
-        }
-        (Some(parts), None, Some(count)) => (parts.make)(&run, epoch, Part::Whole(count)),
-        (Some(parts), None, None) if unit.id != name => (parts.make)(&run, epoch, Part::Prepare),
+    match (&step.photos, unit.photo) {
+        (Some(photos), Some(number)) => (photos.make)(&run, epoch, number),
         _ => (step.make)(&run, epoch),
     }
 }

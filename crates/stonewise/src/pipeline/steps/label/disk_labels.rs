@@ -17,7 +17,7 @@ pub struct DiskLabels {
 impl DiskLabels {
     /// The labels of tiles in a folder.
     pub fn new(dir: &Path, tiles: &DiskTiles) -> Self {
-        let file = |tile| dir.join(Self::file_name(tiles, tile));
+        let file = |tile| dir.join(format!("{}.parquet", tiles.name(tile)));
         Self {
             files: (0..tiles.tile_count()).map(file).collect(),
         }
@@ -28,11 +28,6 @@ impl DiskLabels {
         for &tile in tiles {
             self.files[tile].clone_from(&from.files[tile]);
         }
-    }
-
-    /// Name of the file of a tile.
-    pub fn file_name(tiles: &DiskTiles, tile: usize) -> String {
-        format!("{}.parquet", tiles.name(tile))
     }
 }
 

@@ -1,26 +1,21 @@
 //! An epoch's points with the stone of each.
 
-mod batches;
 mod disk_labels;
-mod step_key;
 
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::cost::{Cost, Sizes};
-use crate::pipeline::graph::{About, Need, PartKind, Parts, Run, Step};
-use crate::pipeline::part::Part;
+use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::steps::ingest::{INGEST, Ingested};
 use crate::pipeline::steps::segment::{SEGMENT, Segmented};
 use crate::pipeline::steps::views::has_no_photos;
 use crate::pipeline::until::Until;
 use crate::project::Project;
 use crate::storage::step::{Key, StepDir};
-use batches::LabelBatches;
 pub use disk_labels::DiskLabels;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use step_key::{label_key, label_name};
 use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::epoch::EpochId;
 use stonewise_core::id::StoneId;
@@ -36,12 +31,7 @@ pub static LABEL: Step = Step {
     about: About::Epoch,
     needs: &[Need::same(&INGEST), Need::same(&SEGMENT)],
     wanted: |until| until >= Until::Labelled,
-    cost: Some(|sizes, epoch| Cost::of(1, sizes.cloud_bytes(epoch))),
-    parts: Some(Parts {
-        kind: PartKind::PreparedTiles,
-        cost: |sizes, epoch| Cost::of(4, depth_map_bytes(sizes) + sizes.cloud_bytes(epoch) / 4),
-        make: do_part,
-    }),
+    cost: Some(|sizes, epoch| Cost::of(4, depth_map_bytes(sizes) + sizes.cloud_bytes(epoch))),
     make: |run, epoch| run.voted(epoch).map(drop),
     ..Step::PLAIN
 };
@@ -120,17 +110,6 @@ impl Run<'_> {
     }
 }
 
-/// Does a part of the step, or gathers all of them.
-fn do_part(run: &Run, epoch: EpochId, part: Part) -> Result<()> {
-    let (ingested, photos) = (run.ingested(epoch)?, run.segmented(epoch)?);
-    let batches = |count| LabelBatches::new(run.context, epoch, &ingested, &photos, count);
-    match part {
-        Part::Tiles(number, count) => batches(count).batch(number).map(drop),
-        Part::Whole(count) => gather_labels(run.context, epoch, &ingested, &photos, count),
-        Part::Prepare | Part::Photo(_) => batches(1).prepare().map(drop),
-    }
-}
-
 /// What was decided about the instances, in the step's folder.
 const TRANSFER: &str = "transfer.json";
 
@@ -191,29 +170,19 @@ fn transferred(
 ) -> Result<StepDir> {
     let params = &context.project.settings.label;
     let tiles = &ingested.tiles.surveyed;
-    let key = label_key(context, epoch, ingested, photos);
-    context.step(&label_name(epoch), key, |step, _| {
+    let map = &context.project.epochs[epoch].map;
+    let geoid = map.geoid.as_deref().and_then(|path| context.digest(path).ok());
+    let key = Key::new(
+        "label",
+        &(params, &map.crs, map.false_origin, geoid),
+        &[ingested.step.key().as_str(), photos.step.key().as_str()],
+    );
+    context.step(&format!("label-{epoch}"), key, |step, _| {
         let mut store = DiskLabels::new(step.path(), tiles);
         let mask = |image| photos.labels(image).map(Some);
         let transfer = transfer_labels(tiles, &photos.views, mask, &mut store, params, context.progress)?;
         write_json(&step.file(TRANSFER), &transfer)
     })
-}
-
-/// Joins the labels of batches of tiles that other processes labelled.
-fn gather_labels(
-    context: &Context,
-    epoch: EpochId,
-    ingested: &Ingested,
-    photos: &Segmented,
-    batches: usize,
-) -> Result<()> {
-    let (name, key) = (label_name(epoch), label_key(context, epoch, ingested, photos));
-    context.step(&name, key.clone(), |step, _| {
-        let batches = LabelBatches::new(context, epoch, ingested, photos, batches);
-        write_json(&step.file(TRANSFER), &batches.gather(step)?)
-    })?;
-    context.store.remove_parts(&name, &key)
 }
 
 /// The labels of an epoch, before its stones are tabulated.

@@ -30,7 +30,6 @@ use photos::tracks_photos;
 pub use registered::Registered;
 use registered::STEP;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
 use std::sync::Arc;
 use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::id::StoneId;
@@ -47,20 +46,7 @@ pub static REGISTER: Step = Step {
     about: About::Later,
     needs: &[Need::same(&MATCH)],
     wanted: |until| until >= Until::Registered,
-    cost: Some(|sizes, epoch| {
-        let photos: Vec<PathBuf> = match tracks_photos(sizes.project, since_reference(epoch)) {
-            true => {
-                let epochs = sizes.project.epochs.pair(epoch).into_array();
-                epochs
-                    .into_iter()
-                    .flat_map(|e| &e.photos)
-                    .map(|p| p.images.clone())
-                    .collect()
-            }
-            false => Vec::new(),
-        };
-        Cost::of(8, POINT_BYTES * sizes.pair_points(epoch)).reading(photos)
-    }),
+    cost: Some(|sizes, epoch| Cost::of(8, POINT_BYTES * sizes.pair_points(epoch))),
     make: |run, epoch| run.registered(epoch).map(drop),
     ..Step::PLAIN
 };

@@ -5,7 +5,6 @@ use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::graph::Run;
-use crate::pipeline::part::Part;
 use crate::pipeline::steps::ingest::Ingested;
 use crate::pipeline::steps::views::{drop_empty, has_no_photos};
 use crate::project::Epoch;
@@ -178,13 +177,13 @@ impl<'a> Detection<'a> {
 
     fn part(&self, number: usize, candidate: &Candidate) -> Result<StepDir> {
         let mut is_made = false;
-        let part = self
-            .context
-            .part((&self.name, &self.key), &Part::Photo(number).name(), |part| {
-                is_made = true;
-                let outcome = self.find(part, candidate)?;
-                write_json(&part.file(PHOTO), &outcome)
-            })?;
+        self.context.progress.check()?;
+        let whole = (self.name.as_str(), &self.key);
+        let part = self.context.store.part(whole, &format!("{number:05}"), |part| {
+            is_made = true;
+            let outcome = self.find(part, candidate)?;
+            write_json(&part.file(PHOTO), &outcome)
+        })?;
         if !is_made {
             self.context.progress.advance(self.tiles(&candidate.view));
         }

@@ -7,8 +7,7 @@ mod voting_photo;
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::cost::{Cost, Sizes};
-use crate::pipeline::graph::{About, Need, PartKind, Parts, Run, Step};
-use crate::pipeline::part::Part;
+use crate::pipeline::graph::{About, Need, Photos, Run, Step};
 use crate::pipeline::steps::ingest::INGEST;
 use crate::pipeline::steps::views::VIEWS;
 use crate::project::{Epoch, Project};
@@ -38,23 +37,11 @@ pub static SEGMENT: Step = Step {
         // A detector that takes relief looks at the clouds, too.
         Need::same(&INGEST).when(takes_relief),
     ],
-    cost: Some(|sizes, epoch| {
-        let own = &sizes.project.epochs[epoch];
-        let cameras = own.photos.as_ref().map(|p| p.cameras.clone());
-        let inputs = cameras.into_iter().chain(own.masks.clone());
-        Cost::of(2, photo_bytes(sizes, epoch)).reading(inputs)
-    }),
-    parts: Some(Parts {
-        kind: PartKind::Photos(photos_to_segment),
-        cost: |sizes, epoch| {
-            let photos = sizes.project.epochs[epoch].photos.iter();
-            let inputs = photos.flat_map(|p| [p.cameras.clone(), p.images.clone()]);
-            Cost::of(4, photo_bytes(sizes, epoch)).reading(inputs)
-        },
-        make: |run, epoch, part| match part {
-            Part::Photo(number) => Detection::new(run, epoch)?.photo(number),
-            _ => run.segmented(epoch).map(drop),
-        },
+    cost: Some(|sizes, epoch| Cost::of(2, photo_bytes(sizes, epoch))),
+    photos: Some(Photos {
+        count: photos_to_segment,
+        cost: |sizes, epoch| Cost::of(4, photo_bytes(sizes, epoch)),
+        make: |run, epoch, number| Detection::new(run, epoch)?.photo(number),
     }),
     make: |run, epoch| run.segmented(epoch).map(drop),
     ..Step::PLAIN
