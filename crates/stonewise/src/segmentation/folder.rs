@@ -3,10 +3,10 @@
 use super::overlay::outlined;
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json, write_readable_json};
-use crate::kept::Kept;
-use crate::storage::step::{Key, StepDir, path_digest};
+use crate::storage::step::{Key, path_digest};
+use crate::storage::store::{Keeps, Origin, StepStore};
 use crate::warnings::{Warning, Warnings};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,6 +19,8 @@ use stonewise_segment::tiling::{TilingOptions, outline_boxes, segment_photo};
 use stonewise_segment::{Segmentation, StoneFinder, Weights};
 
 const STEP: &str = "segment";
+/// Scores of a photo's stones, in the folder of its step.
+const SCORES: &str = "scores.json";
 /// Quality of the overlays.
 const JPEG_QUALITY: u8 = 85;
 
@@ -71,16 +73,6 @@ pub struct PhotoScore {
     pub score: MaskScore,
 }
 
-/// What is kept of a photo that is done, besides its label image.
-#[derive(Serialize, Deserialize)]
-struct Done {
-    /// Digest of the photo.
-    digest: String,
-    /// Its label image, as it was left.
-    labels: Kept,
-    scores: BTreeMap<u32, f32>,
-}
-
 /// Finds the stones of all photos of a folder, or outlines those in given boxes, and writes, in `out`:
 ///
 /// - `labels/NAME.png`: stone of every pixel, 16 bits,
@@ -96,11 +88,10 @@ struct Done {
 /// photo that cannot be read is a warning.
 pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<FolderSummary> {
     let (root, photos) = photos_of(job.photos)?;
-    let detector = blake3::hash(&job.weights.bytes()?).to_hex().to_string();
+    let store = StepStore::new(&job.out.join("work").join(STEP), Keeps::Newest)?;
+    let weights = store.weights_digest(job.weights)?;
     let boxes = job.boxes.map(CocoMasks::open).transpose()?;
-    let digest = job.boxes.map(path_digest).transpose()?;
-    let key = Key::new(STEP, &(job.tiling, digest), &[&detector]);
-    let step = StepDir::open(job.out.join("work").join(STEP), key)?;
+    let boxes_digest = job.boxes.map(path_digest).transpose()?;
     let detector = StoneFinder::open(job.weights, job.tiling.min_score as f32)?;
     let warnings = Warnings::default();
     // Tiles, or boxes.
@@ -117,24 +108,24 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
     progress.begin("stones", photos.iter().map(work).sum());
     let mut masks = CocoFile::default();
     let (mut count, mut stones) = (0, 0);
-    let mut scores: Vec<(String, PhotoPairs)> = Vec::new();
+    let mut pairs: Vec<(String, PhotoPairs)> = Vec::new();
     for (photo, number) in photos.iter().zip(1..) {
         progress.check()?;
         progress.detail(&format!("photo {number} of {}", photos.len()));
         let name = photo.strip_prefix(&root).unwrap_or(photo);
-        let segmented = match taken_over(job, &step, photo, name)? {
-            Some(segmented) => {
-                progress.advance(work(photo));
-                segmented
-            }
-            None => {
-                let image = match read_rgb(photo) {
-                    Ok(image) => image,
-                    Err(error) => {
-                        warnings.skipped(STEP, photo.to_string_lossy(), error.to_string());
-                        continue;
-                    }
-                };
+        let labels = file_in(&job.out.join("labels"), name, "png")?;
+        let key = Key::new(
+            STEP,
+            &(job.tiling, &boxes_digest),
+            &[&weights, &path_digest(photo)?],
+        );
+        let mut unreadable = None;
+        let done = store.step(
+            &name.to_string_lossy(),
+            key,
+            std::slice::from_ref(&labels),
+            |step| {
+                let image = read_rgb(photo).inspect_err(|error| unreadable = Some(error.to_string()))?;
                 let segmented = match &boxes {
                     None => segment_photo(&detector, &image, None, job.tiling, progress)?,
                     Some(boxes) => {
@@ -146,16 +137,22 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
                 };
                 let overlay = file_in(&job.out.join("overlays"), name, "jpg")?;
                 write_jpeg(&overlay, &outlined(&image, &segmented.labels), JPEG_QUALITY)?;
-                let labels = label_path(job, name)?;
                 write_label_png(&labels, &segmented.labels)?;
-                let done = Done {
-                    digest: path_digest(photo)?,
-                    labels: Kept::of(&labels, name.to_path_buf())?,
-                    scores: segmented.scores.clone(),
-                };
-                write_json(&file_in(step.path(), name, "json")?, &done)?;
-                segmented
-            }
+                write_json(&step.file(SCORES), &segmented.scores)
+            },
+        );
+        if let Some(reason) = unreadable {
+            warnings.skipped(STEP, photo.to_string_lossy(), reason);
+            continue;
+        }
+        let (step, origin) = done?;
+        if origin == Origin::Found {
+            progress.advance(work(photo));
+        }
+        let scores: BTreeMap<u32, f32> = read_json(&step.file(SCORES))?;
+        let segmented = Segmentation {
+            labels: read_label_png(&labels)?,
+            scores,
         };
         count += 1;
         stones += segmented.scores.len();
@@ -167,11 +164,11 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
             None => None,
         };
         if let Some((reference, ignore)) = known {
-            scores.push((name.into_owned(), pair_masks(&segmented, &reference, &ignore)));
+            pairs.push((name.into_owned(), pair_masks(&segmented, &reference, &ignore)));
         }
     }
     masks.write(&job.out.join("masks.json"))?;
-    let evaluation = job.reference.map(|_| evaluation(&scores));
+    let evaluation = job.reference.map(|_| evaluation(&pairs));
     if let Some(evaluation) = &evaluation {
         write_readable_json(&job.out.join("evaluation.json"), evaluation)?;
     }
@@ -197,26 +194,6 @@ fn photos_of(path: &Path) -> Result<(PathBuf, Vec<PathBuf>)> {
         });
     }
     Ok((path.to_path_buf(), photos))
-}
-
-/// The result of an earlier call for the same photo.
-fn taken_over(job: &FolderJob, step: &StepDir, photo: &Path, name: &Path) -> Result<Option<Segmentation>> {
-    let (stamp, labels) = (file_in(step.path(), name, "json")?, label_path(job, name)?);
-    // A damaged note of what is done does not count.
-    let Ok(done) = read_json::<Done>(&stamp) else {
-        return Ok(None);
-    };
-    if done.digest != path_digest(photo)? || done.labels.differs(&labels).is_some() {
-        return Ok(None);
-    }
-    Ok(Some(Segmentation {
-        labels: read_label_png(&labels)?,
-        scores: done.scores,
-    }))
-}
-
-fn label_path(job: &FolderJob, name: &Path) -> Result<PathBuf> {
-    file_in(&job.out.join("labels"), name, "png")
 }
 
 /// A file named after a photo; makes the folders on the way.

@@ -1,12 +1,12 @@
 //! The folder of a step.
 //!
-//! `step.json` in it names the key its files were made under: the digest of everything that the result
-//! depends on. `done` lists length and digest of every file that the step stands for, and a step whose files
-//! differ from it is done again. The work is done in a folder beside it, which takes its place when
-//! everything is there.
+//! It is named after the key its files were made under: the digest of everything that the result depends on.
+//! `done` in it lists length and digest of every file that the step stands for, and a step whose files differ
+//! from it is done again. The work is done in a folder beside it, which takes its place when everything is
+//! there.
 
 use crate::error::{Error, Result};
-use crate::files::{write_json, write_text};
+use crate::files::write_json;
 use crate::kept::{Kept, file_digest, files_of};
 use crate::processor_class;
 use serde::Serialize;
@@ -50,7 +50,7 @@ pub struct StepDir {
 /// What is known of a step's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum State {
-    /// Some are still to be made, or they were made under another key.
+    /// They are still to be made.
     Unfinished,
     /// All are there, as they were left.
     Done,
@@ -67,47 +67,28 @@ pub(super) enum Look {
     Digests,
 }
 
-/// The key that a folder was made under.
-const STAMP: &str = "step.json";
-/// What the step stands for, once all of it is there.
-pub(super) const DONE: &str = "done";
+/// What the step stands for.
+const DONE: &str = "done";
 
 impl StepDir {
-    /// Opens the folder of a step, emptied first if it was made under another key.
-    ///
-    /// # Errors
-    /// Something lies there that no step made; a file cannot be written or removed.
-    pub fn open(path: PathBuf, key: Key) -> Result<Self> {
-        let dir = Self { path, key };
-        if !dir.is_of_key() {
-            dir.empty()?;
-        }
-        Ok(dir)
-    }
-
     /// The folder of a step as it is, if it is there.
     pub(super) fn at(path: PathBuf, key: Key) -> Self {
         Self { path, key }
     }
 
-    fn is_of_key(&self) -> bool {
-        fs::read_to_string(self.file(STAMP)).ok().as_deref() == Some(self.key.as_str())
-    }
-
     /// Does the step's work in a folder beside its own, and puts that in its place when everything is there.
     ///
-    /// Where another process has done the same in the meantime, its folder stays. Errors: something lies
-    /// there that no step made; the work fails; a file cannot be written or removed.
+    /// Where another process has done the same in the meantime, its folder stays. Errors: the work fails; a file
+    /// cannot be written or removed.
     pub(super) fn replace(
         &self,
         published: &[PathBuf],
         make: impl FnOnce(&Self) -> Result<()>,
     ) -> Result<()> {
-        self.remove()?;
+        discard(&self.path)?;
         let path = partial_name(&self.path).map_err(Error::io("making a folder beside", &self.path))?;
         fs::create_dir_all(&path).map_err(Error::io("making a folder", &path))?;
         let begun = Begun(Self::at(path, self.key.clone()));
-        write_text(&begun.0.file(STAMP), self.key.as_str())?;
         make(&begun.0)?;
         begun.0.finish(published)?;
         match fs::rename(&begun.0.path, &self.path) {
@@ -118,67 +99,18 @@ impl StepDir {
         }
     }
 
-    /// Removes the folder, whatever it holds of this step's files.
-    fn remove(&self) -> Result<()> {
-        if !self.path.exists() {
-            return Ok(());
-        }
-        self.refuse_foreign()?;
-        let aside = partial_name(&self.path).map_err(Error::io("removing a stale step", &self.path))?;
-        match fs::rename(&self.path, &aside) {
-            Ok(()) => fs::remove_dir_all(&aside).map_err(Error::io("removing a stale step", &aside)),
-            // Another process was faster.
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
-            Err(error) => Err(Error::io("removing a stale step", &self.path)(error)),
-        }
-    }
-
-    /// Refuses a folder whose files have neither a stamp nor the record of a finished step: another program made it.
-    fn refuse_foreign(&self) -> Result<()> {
-        if self.file(STAMP).exists() || self.record(DONE).is_some() || files_of(&self.path, &[])?.is_empty() {
-            return Ok(());
-        }
-        Err(Error::Output {
-            path: self.path.clone(),
-            message: "files that stonewise did not make lie where a step works: move them away".to_owned(),
-        })
-    }
-
     /// What the step's result depends on.
     pub fn key(&self) -> &Key {
         &self.key
     }
 
-    /// Removes every file and begins anew. The stamp goes last: a folder without one is refused.
-    fn empty(&self) -> Result<()> {
-        let stamp = self.file(STAMP);
-        if self.path.exists() {
-            self.refuse_foreign()?;
-            for entry in fs::read_dir(&self.path).map_err(Error::io("listing", &self.path))? {
-                let path = entry.map_err(Error::io("listing", &self.path))?.path();
-                let removed = match path.is_dir() {
-                    true => fs::remove_dir_all(&path),
-                    false if path == stamp => Ok(()),
-                    false => fs::remove_file(&path),
-                };
-                removed.map_err(Error::io("emptying a stale step", &path))?;
-            }
-        }
-        fs::create_dir_all(&self.path).map_err(Error::io("making a folder", &self.path))?;
-        write_text(&stamp, self.key.as_str())
-    }
-
     /// Compares the step's files with what `done` says of them.
     pub(super) fn state(&self, published: &[PathBuf], look: Look) -> State {
-        let stamp = self.file(STAMP);
-        if !stamp.exists() && self.file(DONE).exists() {
-            return State::Damaged(format!("{} is missing", stamp.display()));
-        }
-        if !self.is_of_key() || !self.file(DONE).exists() {
+        if !self.path.exists() {
             return State::Unfinished;
         }
-        let Some(kept) = self.record(DONE) else {
-            return State::Damaged(format!("{} is damaged", self.file(DONE).display()));
+        let Some(kept) = self.record() else {
+            return State::Damaged(format!("{} is missing or damaged", self.file(DONE).display()));
         };
         let inside = kept.len().checked_sub(published.len());
         let Some((own, outside)) = inside.map(|n| kept.split_at(n)) else {
@@ -201,7 +133,7 @@ impl StepDir {
         let below = |path: &PathBuf| path.strip_prefix(&self.path).unwrap_or(path).to_path_buf();
         let name = |path: &PathBuf| PathBuf::from(path.file_name().unwrap_or_default());
         let mut kept = Vec::new();
-        for path in files_of(&self.path, &[STAMP, DONE])? {
+        for path in files_of(&self.path, &[DONE])? {
             kept.push(Kept::of(&path, below(&path))?);
         }
         for path in published {
@@ -210,8 +142,8 @@ impl StepDir {
         write_json(&self.file(DONE), &kept)
     }
 
-    fn record(&self, name: &str) -> Option<Vec<Kept>> {
-        serde_json::from_slice(&fs::read(self.file(name)).ok()?).ok()
+    fn record(&self) -> Option<Vec<Kept>> {
+        serde_json::from_slice(&fs::read(self.file(DONE)).ok()?).ok()
     }
 
     /// Takes a file of another step, which stays there, under a name of its own. Cost: a link, where the file
@@ -237,12 +169,9 @@ impl StepDir {
     }
 }
 
-/// Removes the folder of a step, or of its parts, that is not needed any more; it is gone at once or not at all. What
-/// no step made stays.
+/// Removes the folder of a step, or of its parts, if there is one; it is gone at once or not at all.
 pub(super) fn discard(path: &Path) -> Result<()> {
-    let is_parts = path.extension().is_some_and(|e| e == "parts");
-    let is_ours = is_parts || path.join(STAMP).exists() || path.join(DONE).exists();
-    if !is_ours || !path.is_dir() {
+    if !path.is_dir() {
         return Ok(());
     }
     let aside = partial_name(path).map_err(Error::io("removing a stale step", path))?;
@@ -324,53 +253,6 @@ pub fn code_version() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_same_key_keeps_finished_files_and_another_key_empties_the_folder() {
-        let work = tempfile::tempdir().unwrap();
-        let open = |key| StepDir::open(work.path().join("a"), Key::new("a", &key, &[])).unwrap();
-        let step = open(1);
-        fs::write(step.file("unit"), "x").unwrap();
-        let again = open(1);
-        assert!(again.file("unit").exists());
-        assert_eq!(again.state(&[], Look::Digests), State::Unfinished);
-        again.finish(&[]).unwrap();
-        assert_eq!(step.state(&[], Look::Digests), State::Done);
-        let other = open(2);
-        assert!(!other.file("unit").exists());
-        assert_eq!(other.state(&[], Look::Digests), State::Unfinished);
-    }
-
-    #[test]
-    fn a_finished_step_without_its_stamp_is_damaged_and_done_again() {
-        let work = tempfile::tempdir().unwrap();
-        let key = Key::new("a", &1, &[]);
-        let step = StepDir::open(work.path().join("a"), key.clone()).unwrap();
-        fs::write(step.file("unit"), "x").unwrap();
-        step.finish(&[]).unwrap();
-        fs::remove_file(step.file(STAMP)).unwrap();
-        let State::Damaged(why) = step.state(&[], Look::Digests) else {
-            panic!("a step without its stamp is taken over");
-        };
-        assert!(why.contains("step.json is missing"), "{why}");
-        let again = |dir: &StepDir| {
-            fs::write(dir.file("unit"), "y").unwrap();
-            Ok(())
-        };
-        step.replace(&[], again).unwrap();
-        assert_eq!(step.state(&[], Look::Digests), State::Done);
-        assert_eq!(fs::read_to_string(step.file("unit")).unwrap(), "y");
-    }
-
-    #[test]
-    fn files_that_no_step_made_are_not_removed() {
-        let work = tempfile::tempdir().unwrap();
-        fs::create_dir(work.path().join("a")).unwrap();
-        fs::write(work.path().join("a/thesis.tex"), "x").unwrap();
-        let refused = StepDir::open(work.path().join("a"), Key::new("a", &1, &[]));
-        assert!(refused.unwrap_err().to_string().contains("did not make"));
-        assert!(work.path().join("a/thesis.tex").exists());
-    }
 
     #[test]
     fn a_key_depends_on_every_part_and_on_where_parts_end() {

@@ -249,7 +249,7 @@ mod tests {
     #[test]
     fn damaged_truncated_and_missing_files_are_made_again_with_the_reason() {
         type Spoil = fn(&Path, &Path);
-        let cases: [(&str, Spoil); 6] = [
+        let cases: [(&str, Spoil); 7] = [
             ("changed or damaged", |dir, _| {
                 fs::write(dir.join("tile"), "some pointz").unwrap()
             }),
@@ -259,8 +259,11 @@ mod tests {
             ("tile is missing", |dir, _| {
                 fs::remove_file(dir.join("tile")).unwrap()
             }),
-            ("done is damaged", |dir, _| {
+            ("done is missing or damaged", |dir, _| {
                 fs::write(dir.join("done"), "[{").unwrap()
+            }),
+            ("done is missing or damaged", |dir, _| {
+                fs::remove_file(dir.join("done")).unwrap()
             }),
             ("cloud.laz is missing", |_, cloud| fs::remove_file(cloud).unwrap()),
             ("cloud.laz was changed", |_, cloud| {
