@@ -83,16 +83,18 @@ impl OutputFolder {
         Ok(Self {
             path: path.to_path_buf(),
             forced: false,
-            _lock: FolderLock::take_for_unit(path)?,
+            _lock: FolderLock::take_for_units(path)?,
         })
     }
 
     /// Keeps the folder for a plan whose units other processes do.
-    pub(crate) fn admit_units(self) -> Self {
-        Self {
-            _lock: self._lock.admit_units(),
-            ..self
-        }
+    ///
+    /// # Errors
+    /// A run has begun in between.
+    pub(crate) fn admit_units(self) -> Result<Self> {
+        let path = self.path.clone();
+        drop(self);
+        Self::of_unit(&path)
     }
 
     /// The folder itself.

@@ -5,19 +5,14 @@ use crate::results::names::WORK_DIR;
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
-/// The file that is locked; it stays behind empty and means nothing then.
+/// The file that is locked, by a run for itself, by units of a plan together; it stays behind empty and means
+/// nothing then.
 pub(super) const LOCK_FILE: &str = "lock";
-/// The file that every unit of a plan locks together with all others, and a run for itself; the same holds
-/// for it.
-pub(super) const UNITS_LOCK_FILE: &str = "units.lock";
 
 /// Holds an output folder for this process. The system releases it with the process, however that ends.
 #[derive(Debug)]
 pub(super) struct FolderLock {
-    /// `None` for a unit: another process coordinates.
-    _folder: Option<File>,
-    /// `None` for a coordinator while others do the units.
-    _units: Option<File>,
+    _file: File,
 }
 
 impl FolderLock {
@@ -27,39 +22,23 @@ impl FolderLock {
     /// Another process, or another run of this one, holds it; units are being done; the file system has no
     /// locks.
     pub fn take(folder: &Path) -> Result<Self> {
-        let (lock, path) = open(folder, LOCK_FILE)?;
-        held(lock.try_lock(), folder, &path)?;
-        let (units, path) = open(folder, UNITS_LOCK_FILE)?;
-        held(units.try_lock(), folder, &path)?;
-        Ok(Self {
-            _folder: Some(lock),
-            _units: Some(units),
-        })
+        let (file, path) = open(folder)?;
+        held(file.try_lock(), folder, &path)?;
+        Ok(Self { _file: file })
     }
 
-    /// Locks a folder for a unit of its plan, beside other units.
-    pub fn take_for_unit(folder: &Path) -> Result<Self> {
-        let (units, path) = open(folder, UNITS_LOCK_FILE)?;
-        held(units.try_lock_shared(), folder, &path)?;
-        Ok(Self {
-            _folder: None,
-            _units: Some(units),
-        })
-    }
-
-    /// Lets units work; no other run, and no other coordinator, may begin.
-    pub fn admit_units(self) -> Self {
-        Self {
-            _folder: self._folder,
-            _units: None,
-        }
+    /// Locks a folder for a unit of its plan, or for who coordinates them, beside other units.
+    pub fn take_for_units(folder: &Path) -> Result<Self> {
+        let (file, path) = open(folder)?;
+        held(file.try_lock_shared(), folder, &path)?;
+        Ok(Self { _file: file })
     }
 }
 
-fn open(folder: &Path, name: &str) -> Result<(File, PathBuf)> {
+fn open(folder: &Path) -> Result<(File, PathBuf)> {
     let work = folder.join(WORK_DIR);
     fs::create_dir_all(&work).map_err(Error::io("making a folder", &work))?;
-    let path = work.join(name);
+    let path = work.join(LOCK_FILE);
     let file = File::options()
         .create(true)
         .truncate(false)
@@ -101,14 +80,12 @@ mod tests {
     #[test]
     fn units_work_side_by_side_and_keep_runs_out() {
         let folder = tempfile::tempdir().unwrap();
-        let units = [0, 1].map(|_| FolderLock::take_for_unit(folder.path()).unwrap());
+        let units = [0, 1].map(|_| FolderLock::take_for_units(folder.path()).unwrap());
         assert!(FolderLock::take(folder.path()).is_err());
         drop(units);
         let run = FolderLock::take(folder.path()).unwrap();
-        assert!(FolderLock::take_for_unit(folder.path()).is_err());
-        let coordinator = run.admit_units();
-        let _unit = FolderLock::take_for_unit(folder.path()).unwrap();
-        assert!(FolderLock::take(folder.path()).is_err());
-        drop(coordinator);
+        assert!(FolderLock::take_for_units(folder.path()).is_err());
+        drop(run);
+        FolderLock::take_for_units(folder.path()).unwrap();
     }
 }

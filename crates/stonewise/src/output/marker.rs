@@ -1,7 +1,7 @@
 //! Whose results a folder holds.
 
 use super::inputs::resolved;
-use super::lock::{LOCK_FILE, UNITS_LOCK_FILE};
+use super::lock::LOCK_FILE;
 use super::partials::is_partial;
 use crate::error::{Error, Result};
 use crate::files::write_readable_json;
@@ -160,7 +160,7 @@ fn is_empty(folder: &Path) -> Result<bool> {
             Err(e) => Err(Error::io("listing the output folder", dir)(e)),
         }
     };
-    let begun = |name: &String| [LOCK_FILE, UNITS_LOCK_FILE].contains(&name.as_str()) || is_partial(name);
+    let begun = |name: &String| name == LOCK_FILE || is_partial(name);
     Ok(match names(folder)?.as_slice() {
         [] => true,
         [only] if only == WORK_DIR => names(&folder.join(WORK_DIR))?.iter().all(begun),
@@ -264,7 +264,6 @@ mod tests {
         let work = dir.path().join(WORK_DIR);
         fs::create_dir(&work).unwrap();
         fs::write(work.join(LOCK_FILE), "").unwrap();
-        fs::write(work.join(UNITS_LOCK_FILE), "").unwrap();
         fs::write(work.join(".marker.json.12.partial"), "{").unwrap();
         assert!(matches!(look(dir.path(), &owner).unwrap(), Found::Empty));
         fs::write(work.join("notes"), "mine").unwrap();

@@ -89,7 +89,7 @@ pub fn plan(
     write_readable_json(&plan_file(out), &plan)?;
     Ok(Coordinator {
         plan,
-        _folder: folder.admit_units(),
+        _folder: folder.admit_units()?,
     })
 }
 
