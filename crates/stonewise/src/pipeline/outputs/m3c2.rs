@@ -1,6 +1,7 @@
 //! The M3C2 core points as cloud and table.
 
 use crate::error::Result;
+use crate::pipeline::steps::m3c2::field_table;
 use crate::results::names::PairFile;
 use nalgebra::Point3;
 use std::path::Path;
@@ -8,7 +9,7 @@ use stonewise_core::change::{ChangeField, ChangePoint};
 use stonewise_core::epoch::EpochId;
 use stonewise_io::cloud::{Dimension, ExtraColumn, write_points_laz};
 use stonewise_io::crs::Crs;
-use stonewise_io::table::{Table, write_csv};
+use stonewise_io::table::write_csv;
 
 /// What the table of core points as a whole holds.
 const DESCRIPTION: &str = "M3C2 (Lague, Brodu & Leroux 2013), one row per core point of the first epoch. Distances are later epoch minus first, \
@@ -35,43 +36,8 @@ const DIMENSIONS: [Dimension; 10] = [
 /// In the LAZ an unknown number is NaN; in the CSV its cell is empty.
 pub fn write_m3c2(dir: &Path, later: EpochId, crs: Option<&Crs>, field: &ChangeField) -> Result<()> {
     let csv = dir.join(PairFile::M3c2Csv.name(later.index()));
-    write_csv(&csv, &table(field)?, DESCRIPTION, None)?;
+    write_csv(&csv, &field_table(field)?, DESCRIPTION, None)?;
     write_cloud(&dir.join(PairFile::M3c2Laz.name(later.index())), crs, field)
-}
-
-fn table(field: &ChangeField) -> Result<Table> {
-    let points = &field.points;
-    let real = |of: fn(&ChangePoint) -> f64| points.iter().map(of).collect::<Vec<f64>>();
-    let known = |of: fn(&ChangePoint) -> Option<f64>| points.iter().map(of).collect::<Vec<_>>();
-    let count = |of: fn(&ChangePoint) -> u32| points.iter().map(of).collect::<Vec<u32>>();
-    let mut table = Table::new();
-    table.push("x", "m", "core point, world x", real(|p| p.position.x))?;
-    table.push("y", "m", "core point, world y", real(|p| p.position.y))?;
-    table.push("z", "m", "core point, world z", real(|p| p.position.z))?;
-    let outward = "unit normal out of the wall, world";
-    table.push("NormalX", "", &format!("{outward} x"), real(|p| p.normal.x))?;
-    table.push("NormalY", "", &format!("{outward} y"), real(|p| p.normal.y))?;
-    table.push("NormalZ", "", &format!("{outward} z"), real(|p| p.normal.z))?;
-    let meaning = "distance along the normal, positive out of the wall";
-    table.push("m3c2_distance", "m", meaning, known(|p| p.distance_m))?;
-    let meaning = "95 % detection limit of the distance";
-    table.push("m3c2_uncertainty", "m", meaning, known(|p| p.detection_limit_m))?;
-    let meaning = "spread of the first epoch's points along the normal";
-    table.push("m3c2_std_dev1", "m", meaning, known(|p| p.spread_m[0]))?;
-    let meaning = "spread of the later epoch's points along the normal";
-    table.push("m3c2_std_dev2", "m", meaning, known(|p| p.spread_m[1]))?;
-    let meaning = "1 where the distance exceeds its detection limit, else 0";
-    table.push(
-        "m3c2_significant",
-        "",
-        meaning,
-        count(|p| u32::from(p.is_significant())),
-    )?;
-    let meaning = "points of the first epoch in the cylinder";
-    table.push("m3c2_count1", "", meaning, count(|p| p.counts[0]))?;
-    let meaning = "points of the later epoch in the cylinder";
-    table.push("m3c2_count2", "", meaning, count(|p| p.counts[1]))?;
-    Ok(table)
 }
 
 fn write_cloud(path: &Path, crs: Option<&Crs>, field: &ChangeField) -> Result<()> {
@@ -117,7 +83,7 @@ mod tests {
 
     #[test]
     fn cloud_and_table_name_and_measure_the_same() {
-        let table = table(&ChangeField { points: Vec::new() }).unwrap();
+        let table = field_table(&ChangeField { points: Vec::new() }).unwrap();
         let unit = |name| table.description(name).unwrap().0;
         let of_table = table.names().skip(3).map(|name| (name, unit(name)));
         assert!(DIMENSIONS.iter().map(|d| (d.name, d.unit)).eq(of_table));

@@ -58,7 +58,7 @@ pub fn m3c2(run: &Run, later: EpochId, outward: &OutwardReference) -> Result<Ste
     run.context.step(&format!("m3c2-{later}"), key, |step, _| {
         let tiles = clouds.each_ref().map(|e| &e.tiles);
         let field = m3c2_survey(tiles.first, tiles.later, outward, params, run.context.progress)?;
-        write_field(&step.file(FIELD), &field)
+        Ok(write_parquet(&step.file(FIELD), &field_table(&field)?)?)
     })
 }
 
@@ -96,40 +96,40 @@ pub fn with_datum(
     })
 }
 
-fn write_field(path: &Path, field: &ChangeField) -> Result<()> {
-    let numbers = |value: fn(&ChangePoint) -> f64| field.points.iter().map(value).collect::<Vec<f64>>();
-    let options = |value: fn(&ChangePoint) -> Option<f64>| {
-        let values = field.points.iter().map(value);
-        values.collect::<Vec<Option<f64>>>()
-    };
-    let counts = |value: fn(&ChangePoint) -> u32| field.points.iter().map(value).collect::<Vec<u32>>();
+/// The comparison as a table, with PDAL's names of dimensions.
+pub fn field_table(field: &ChangeField) -> Result<Table> {
+    let points = &field.points;
+    let real = |of: fn(&ChangePoint) -> f64| points.iter().map(of).collect::<Vec<f64>>();
+    let known = |of: fn(&ChangePoint) -> Option<f64>| points.iter().map(of).collect::<Vec<_>>();
+    let count = |of: fn(&ChangePoint) -> u32| points.iter().map(of).collect::<Vec<u32>>();
     let mut table = Table::new();
-    table.push("x", "m", "core point, world x", numbers(|p| p.position.x))?;
-    table.push("y", "m", "core point, world y", numbers(|p| p.position.y))?;
-    table.push("z", "m", "core point, world z", numbers(|p| p.position.z))?;
-    table.push("nx", "", "unit normal, world x", numbers(|p| p.normal.x))?;
-    table.push("ny", "", "unit normal, world y", numbers(|p| p.normal.y))?;
-    table.push("nz", "", "unit normal, world z", numbers(|p| p.normal.z))?;
-    let meaning = "distance along the normal";
-
-    table.push("distance_m", "m", meaning, options(|p| p.distance_m))?;
+    table.push("x", "m", "core point, world x", real(|p| p.position.x))?;
+    table.push("y", "m", "core point, world y", real(|p| p.position.y))?;
+    table.push("z", "m", "core point, world z", real(|p| p.position.z))?;
+    let outward = "unit normal out of the wall, world";
+    table.push("NormalX", "", &format!("{outward} x"), real(|p| p.normal.x))?;
+    table.push("NormalY", "", &format!("{outward} y"), real(|p| p.normal.y))?;
+    table.push("NormalZ", "", &format!("{outward} z"), real(|p| p.normal.z))?;
+    let meaning = "distance along the normal, positive out of the wall";
+    table.push("m3c2_distance", "m", meaning, known(|p| p.distance_m))?;
     let meaning = "95 % detection limit of the distance";
+    table.push("m3c2_uncertainty", "m", meaning, known(|p| p.detection_limit_m))?;
+    let meaning = "spread of the first epoch's points along the normal";
+    table.push("m3c2_std_dev1", "m", meaning, known(|p| p.spread_m[0]))?;
+    let meaning = "spread of the later epoch's points along the normal";
+    table.push("m3c2_std_dev2", "m", meaning, known(|p| p.spread_m[1]))?;
+    let meaning = "1 where the distance exceeds its detection limit, else 0";
     table.push(
-        "detection_limit_m",
-        "m",
+        "m3c2_significant",
+        "",
         meaning,
-        options(|p| p.detection_limit_m),
+        count(|p| u32::from(p.is_significant())),
     )?;
-    let meaning = "spread along the normal, first epoch";
-    table.push("spread_1_m", "m", meaning, options(|p| p.spread_m[0]))?;
-    let meaning = "spread along the normal, later epoch";
-    table.push("spread_2_m", "m", meaning, options(|p| p.spread_m[1]))?;
-    let meaning = "points in the cylinder, first epoch";
-    table.push("count_1", "", meaning, counts(|p| p.counts[0]))?;
-
-    let meaning = "points in the cylinder, later epoch";
-    table.push("count_2", "", meaning, counts(|p| p.counts[1]))?;
-    Ok(write_parquet(path, &table)?)
+    let meaning = "points of the first epoch in the cylinder";
+    table.push("m3c2_count1", "", meaning, count(|p| p.counts[0]))?;
+    let meaning = "points of the later epoch in the cylinder";
+    table.push("m3c2_count2", "", meaning, count(|p| p.counts[1]))?;
+    Ok(table)
 }
 
 fn read_field(path: &Path) -> Result<ChangeField> {
@@ -140,20 +140,20 @@ fn read_field(path: &Path) -> Result<ChangeField> {
         table.required("z")?,
     ];
     let [nx, ny, nz] = [
-        table.required::<f64>("nx")?,
-        table.required("ny")?,
-        table.required("nz")?,
+        table.required::<f64>("NormalX")?,
+        table.required("NormalY")?,
+        table.required("NormalZ")?,
     ];
-    let distance_m = table.optional::<f64>("distance_m")?;
-    let detection_limit_m = table.optional::<f64>("detection_limit_m")?;
+    let distance_m = table.optional::<f64>("m3c2_distance")?;
+    let detection_limit_m = table.optional::<f64>("m3c2_uncertainty")?;
     let spread_m = [
-        table.optional::<f64>("spread_1_m")?,
-        table.optional::<f64>("spread_2_m")?,
+        table.optional::<f64>("m3c2_std_dev1")?,
+        table.optional::<f64>("m3c2_std_dev2")?,
     ];
 
     let counts = [
-        table.required::<u32>("count_1")?,
-        table.required::<u32>("count_2")?,
+        table.required::<u32>("m3c2_count1")?,
+        table.required::<u32>("m3c2_count2")?,
     ];
     let points = (0..table.rows()).map(|i| ChangePoint {
         position: Point3::new(x[i], y[i], z[i]),
@@ -226,7 +226,7 @@ mod tests {
                 points: (0..count).map(point).collect(),
             };
             let path = folder.path().join(FIELD);
-            write_field(&path, &field).unwrap();
+            write_parquet(&path, &field_table(&field).unwrap()).unwrap();
             assert_eq!(read_field(&path).unwrap(), field);
         }
     }
