@@ -32,19 +32,20 @@ const NEEDED: [&str; 11] = [
 pub fn evaluate_truth(results: &Path, truth: &Path, params: &EvaluationParams) -> Result<Evaluation> {
     let set = ResultSet::read(results)?;
     let stones = read_truth(truth)?;
-    let normal = |row: &StoneRow| set.outlines.get(&row.stone_id).map_or(Vector3::x(), |o| o.normal);
-    let outcomes: Vec<StoneOutcome> = set
-        .stones
-        .iter()
-        .map(|row| outcome(row, normal(row), set.datum()))
-        .collect();
-    let outcomes = owned_by_nearest(outcomes, &stones, params);
+    let outcomes = owned_by_nearest(outcomes(&set), &stones, params);
     let mut evaluation = Evaluation::new(truth.display().to_string(), params);
     evaluation.external = Some(score_against_truth(&outcomes, &stones, params));
     evaluation.rotations = score_rotations(&outcomes, &stones, params);
     evaluation.neighbours = score_neighbours(&outcomes, &stones, &set.neighbours, params);
     write_readable_json(&results.join(EVALUATION_TRUTH), &evaluation)?;
     Ok(evaluation)
+}
+
+/// The stones of a run as the evaluation takes them.
+pub(crate) fn outcomes(set: &ResultSet) -> Vec<StoneOutcome> {
+    let normal = |row: &StoneRow| set.outlines.get(&row.stone_id).map_or(Vector3::x(), |o| o.normal);
+    let rows = set.stones.iter();
+    rows.map(|row| outcome(row, normal(row), set.datum())).collect()
 }
 
 /// A row as the evaluation takes it; `datum`: what is known about the registration of its epoch.

@@ -17,6 +17,6 @@ pub use claim::OutputFolder;
 pub(crate) use digests::Digests;
 pub use marker::Owner;
 pub use previous::UNFINISHED_FILE;
-pub(crate) use previous::named_results_in;
+pub(crate) use previous::{named_results_in, results_in};
 pub use result_names::PREVIOUS_DIR;
 pub(crate) use result_names::cloud_names;

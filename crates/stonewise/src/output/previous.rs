@@ -120,7 +120,7 @@ fn move_file(from: &Path, to: &Path) -> Result<()> {
 ///
 /// # Errors
 /// The folder cannot be listed.
-pub(super) fn results_in(folder: &Path, project: &Project) -> Result<Vec<PathBuf>> {
+pub(crate) fn results_in(folder: &Path, project: &Project) -> Result<Vec<PathBuf>> {
     let clouds = project.epochs.iter().zip(1..);
     let clouds = clouds.flat_map(|(epoch, number)| cloud_names(number, &epoch.clouds));
     let mut results = named_results_in(folder)?;

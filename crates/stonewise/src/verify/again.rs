@@ -2,12 +2,12 @@
 
 use super::compare::{Tolerance, first_cell, first_difference};
 use super::finding::{Answer, Finding, Maker};
-use super::scratch::Scratch;
+use super::scratch::scratch;
 use super::tables::copy;
 use crate::error::{Error, Result};
 use crate::export::write_layers;
 use crate::files::read_json;
-use crate::output::{Digests, OutputFolder, cloud_names};
+use crate::output::{Digests, OutputFolder, named_results_in, results_in};
 use crate::pipeline::{Until, run as run_project};
 use crate::project::Project;
 use crate::report::write_report;
@@ -42,7 +42,7 @@ pub(super) fn again(
     project: &Project,
     progress: &dyn Progress,
 ) -> Result<Vec<Finding>> {
-    let scratch = Scratch::new()?;
+    let scratch = scratch()?;
     let folder = OutputFolder::of_project(scratch.path(), project, false)?;
     let until = match results.join(REPORT_DIR).exists() {
         true => Until::Reported,
@@ -129,14 +129,12 @@ fn strip(value: &mut Value) {
 /// All files of either folder that a run makes.
 fn files_of_both(old: &Path, new: &Path, project: &Project) -> Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = Vec::new();
+    files.extend(named_results_in(old)?);
+    files.extend(results_in(new, project)?);
     for folder in [old, new] {
-        files.extend(crate::output::named_results_in(folder)?);
         let digests = Digests::read(folder).ok().flatten().unwrap_or_default();
         files.extend(digests.iter().map(|(file, _)| file.to_path_buf()));
     }
-    let clouds = (1..).zip(project.epochs.iter());
-    let clouds = clouds.flat_map(|(number, epoch)| cloud_names(number, &epoch.clouds));
-    files.extend(clouds.filter(|cloud| new.join(cloud).is_file()));
     let not_of_a_run = [RUN, DIGESTS, EVALUATION_TRUTH].map(Path::new);
     files.retain(|file| !not_of_a_run.contains(&file.as_path()));
     files.sort();

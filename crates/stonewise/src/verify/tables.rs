@@ -2,7 +2,7 @@
 
 use super::compare::{Tolerance, first_cell, first_difference, json};
 use super::finding::{Answer, Finding, Maker};
-use super::scratch::Scratch;
+use super::scratch::scratch;
 use crate::error::{Error, Result};
 use crate::export::write_layers;
 use crate::files::read_json;
@@ -14,14 +14,14 @@ use crate::results::names::{
     VERDICT,
 };
 use crate::results::records::{EpochRecord, RunRecord};
-use crate::results::{ResultSet, StoneRow, write_stones_csv};
-use crate::truth::outcome;
+use crate::results::{ResultSet, write_stones_csv};
+use crate::truth::outcomes;
 use nalgebra::{Point3, Vector3};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use stonewise_core::evaluate::{StoneOutcome, score_stones};
+use stonewise_core::evaluate::score_stones;
 use stonewise_core::progress::Progress;
 use stonewise_io::table::{Table, read_parquet};
 
@@ -69,7 +69,7 @@ fn fails(subject: &str, message: String) -> Option<Finding> {
 /// `stones.csv` is the text of `stones.parquet`.
 fn text_of(results: &Path, pair: usize) -> Compared {
     let [csv, parquet] = [PairFile::StonesCsv, PairFile::StonesParquet].map(|file| file.name(pair));
-    let scratch = Scratch::new()?;
+    let scratch = scratch()?;
     write_stones_csv(scratch.path(), pair, &read_parquet(&results.join(&parquet))?)?;
     let [found, made] = [results, scratch.path()].map(|folder| text(&folder.join(&csv)));
     let (found, made) = (found?, made?);
@@ -150,13 +150,7 @@ fn evaluation(results: &Path, run: &RunRecord, pair: usize) -> Compared {
         return Ok(None);
     };
     let found: Value = read_json(&results.join(&name))?;
-    let set = ResultSet::read_measured(results, pair)?;
-    let normal = |row: &StoneRow| set.outlines.get(&row.stone_id).map_or(Vector3::x(), |o| o.normal);
-    let outcomes: Vec<StoneOutcome> = set
-        .stones
-        .iter()
-        .map(|row| outcome(row, normal(row), set.datum()))
-        .collect();
+    let outcomes = outcomes(&ResultSet::read_measured(results, pair)?);
     let at = |epoch: &EpochRecord, p: &Point3<f64>| {
         epoch
             .motion
@@ -176,7 +170,7 @@ fn evaluation(results: &Path, run: &RunRecord, pair: usize) -> Compared {
 
 /// The report and the layers, made from the other files again.
 fn made_again(results: &Path, run: &RunRecord) -> Result<Vec<Finding>> {
-    let scratch = Scratch::new()?;
+    let scratch = scratch()?;
     copy_results(results, scratch.path())?;
     let reports = named_results_in(results)?
         .into_iter()
