@@ -8,7 +8,7 @@ use crate::pipeline::units::receipt::receipt_file;
 use crate::pipeline::until::Until;
 use crate::project::Project;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// A unit of work: a step, or one photo of it.
@@ -24,10 +24,10 @@ pub struct Unit {
     /// Which photo of the step, from 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub photo: Option<usize>,
-    /// Units that come first. Units of one rank do not need each other, and only ones of lower ranks.
+    /// Units of one rank do not need each other, and only ones of lower ranks.
     pub rank: usize,
-    /// The units that it needs; what these need is left out.
-    pub needs: Vec<String>,
+    /// The units that come before it.
+    pub needs: BTreeSet<String>,
     /// The file, relative to the results folder, that says it is done.
     pub output: PathBuf,
     /// Threads that it makes good use of; it works with any number.
@@ -50,91 +50,63 @@ pub(super) fn units_of(project: &Project) -> Result<Vec<Unit>> {
         .iter()
         .filter_map(|task| Some((task, task.step.cost?)))
         .collect();
-    let mut list = List::default();
+    let mut units: Vec<Unit> = Vec::new();
 
     for (number, (task, cost)) in (1..).zip(&with_unit) {
         let mut before = match number == with_unit.len() {
-            true => list.units.iter().map(|unit| unit.id.clone()).collect(),
+            true => needed_by_none(&units),
             false => needs(task, project),
         };
         if let Some(photos) = &task.step.photos {
             let cost = (photos.cost)(&sizes, task.epoch);
             let all = 0..(photos.count)(project, task.epoch)?;
-            let ids: Vec<String> = all
-                .map(|photo| list.push(task, Some(photo), &before, cost))
+            let all: Vec<Unit> = all
+                .map(|photo| unit(task, Some(photo), before.clone(), cost, &units))
                 .collect();
-            if !ids.is_empty() {
-                before = ids;
+            if !all.is_empty() {
+                before = all.iter().map(|unit| unit.id.clone()).collect();
             }
+            units.extend(all);
         }
-        list.push(task, None, &before, cost(&sizes, task.epoch));
+        units.push(unit(task, None, before, cost(&sizes, task.epoch), &units));
     }
 
-    Ok(list.units)
+    Ok(units)
 }
 
 /// The units that a task needs; those of steps that are no unit need others in their place.
-fn needs(task: &Task, project: &Project) -> Vec<String> {
+fn needs(task: &Task, project: &Project) -> BTreeSet<String> {
     let others = task.needs(project);
     let ids = others.iter().flat_map(|other| match other.step.cost {
-        Some(_) => vec![other.id()],
+        Some(_) => BTreeSet::from([other.id()]),
         None => needs(other, project),
     });
     ids.collect()
 }
 
-/// Units as they are added.
-#[derive(Default)]
-struct List {
-    units: Vec<Unit>,
-    ranks: BTreeMap<String, usize>,
-    /// What each unit needs, and what that needs.
-    before: BTreeMap<String, BTreeSet<String>>,
+fn needed_by_none(units: &[Unit]) -> BTreeSet<String> {
+    let needed: BTreeSet<&String> = units.iter().flat_map(|unit| &unit.needs).collect();
+    let ids = units.iter().map(|unit| &unit.id);
+    ids.filter(|id| !needed.contains(id)).cloned().collect()
 }
 
-impl List {
-    /// Adds a task or one photo of it; its name.
-    fn push(&mut self, task: &Task, photo: Option<usize>, needs: &[String], cost: Cost) -> String {
-        let id = match photo {
-            Some(number) => format!("{}.{number:05}", task.id()),
-            None => task.id(),
-        };
-        let needs = self.without_implied(needs);
-        let mut before: BTreeSet<String> = needs.iter().cloned().collect();
-        before.extend(
-            needs
-                .iter()
-                .filter_map(|id| self.before.get(id))
-                .flatten()
-                .cloned(),
-        );
-
-        let ranks = needs.iter().filter_map(|id| self.ranks.get(id));
-        let rank = ranks.max().map_or(0, |rank| rank + 1);
-        self.before.insert(id.clone(), before);
-        self.ranks.insert(id.clone(), rank);
-        self.units.push(Unit {
-            step: task.step.name.to_owned(),
-            epoch: (task.step.about != About::Survey).then(|| task.epoch.number()),
-            photo,
-            rank,
-            needs,
-            output: receipt_file(&id),
-            cores: cost.cores,
-            memory_bytes: BASE_BYTES + cost.bytes,
-            done: false,
-            id: id.clone(),
-        });
-
-        id
-    }
-
-    /// Needs that no other of them needs, once each.
-    fn without_implied(&self, needs: &[String]) -> Vec<String> {
-        let mut seen: BTreeSet<&String> = { needs.iter() }
-            .filter_map(|id| self.before.get(id))
-            .flatten()
-            .collect();
-        needs.iter().filter(|&id| seen.insert(id)).cloned().collect()
+/// The unit of a task, or of one photo of it; `earlier`: those that it may need.
+fn unit(task: &Task, photo: Option<usize>, needs: BTreeSet<String>, cost: Cost, earlier: &[Unit]) -> Unit {
+    let id = match photo {
+        Some(number) => format!("{}.{number:05}", task.id()),
+        None => task.id(),
+    };
+    let ranks = earlier.iter().filter(|u| needs.contains(&u.id)).map(|u| u.rank);
+    Unit {
+        step: task.step.name.to_owned(),
+        epoch: (task.step.about != About::Survey).then(|| task.epoch.number()),
+        photo,
+        rank: ranks.max().map_or(0, |rank| rank + 1),
+        needs,
+        output: receipt_file(&id),
+        cores: cost.cores,
+        memory_bytes: BASE_BYTES + cost.bytes,
+        done: false,
+        id,
     }
 }
