@@ -56,18 +56,7 @@ impl<'a> Observer<'a> {
     ) -> Result<Self, TransferError> {
         let (views, labels): (Vec<&View>, Vec<RunLabels>) = masked.into_iter().unzip();
         let (depths, surfaces) = splat_all(tiles, &views, params, progress)?;
-        Ok(Self::of(views, labels, depths, surfaces, params))
-    }
-
-    /// `labels`, `depths`: of each view; `surfaces`: of each tile.
-    fn of(
-        views: Vec<&'a View>,
-        labels: Vec<RunLabels>,
-        depths: Vec<SplatDepth>,
-        surfaces: Vec<SurfaceCells>,
-        params: &'a TransferParams,
-    ) -> Self {
-        Self {
+        Ok(Self {
             centres: views.iter().map(|v| v.centre()).collect(),
             cones: views.iter().map(|v| Cone::of(v)).collect(),
             frames: views.iter().map(|v| PhotoFrame::of(v)).collect(),
@@ -81,7 +70,7 @@ impl<'a> Observer<'a> {
             surfaces,
             params,
             least_cosine: params.max_incidence_rad.cos(),
-        }
+        })
     }
 
     /// The photos that have masks.
@@ -442,15 +431,10 @@ mod tests {
             .collect();
         let labels = || RunLabels::new(&LabelImage::filled(40, 30, 1));
         let params = TransferParams::default();
-        let surfaces = vec![SurfaceCells::new(&cloud, params.cell_m)];
-        let groups = surfaces[0].groups(&cloud);
-        let observer = Observer::of(
-            views.iter().collect(),
-            views.iter().map(|_| labels()).collect(),
-            views.iter().map(|v| SplatDepth::new(v, 1.0)).collect(),
-            surfaces,
-            &params,
-        );
+        let masked = views.iter().map(|v| (v, labels())).collect();
+        let tiles = crate::cloud::MemoryTiles::new([cloud.clone()]);
+        let observer = Observer::new(&tiles, masked, &params, &crate::progress::Silent).unwrap();
+        let groups = observer.surfaces[0].groups(&cloud);
         let (mut left_out, mut seen) = (0, 0);
         for group in &groups {
             for photo in 0..views.len() {
