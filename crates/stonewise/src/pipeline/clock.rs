@@ -1,5 +1,6 @@
 //! Wall time, processor time and memory of this process.
 
+use crate::results::records::StepTime;
 use std::fs;
 use std::time::Instant;
 
@@ -22,14 +23,25 @@ impl Clock {
         }
     }
 
+    /// What a step took that began with the clock; `resumed`: whether an earlier run did it.
+    pub fn step_time(&self, step: &str, resumed: bool) -> StepTime {
+        StepTime {
+            step: step.to_owned(),
+            seconds: self.wall_seconds(),
+            processor_seconds: self.processor_seconds(),
+            resumed,
+            peak_memory_bytes: peak_memory_bytes(),
+        }
+    }
+
     /// Wall time since the start, seconds.
-    pub fn wall_seconds(&self) -> f64 {
+    fn wall_seconds(&self) -> f64 {
         self.wall.elapsed().as_secs_f64()
     }
 
     /// Processor time of all threads since the start, seconds, to a hundredth; `None` where the system does
     /// not report it.
-    pub fn processor_seconds(&self) -> Option<f64> {
+    fn processor_seconds(&self) -> Option<f64> {
         Some(processor_seconds()? - self.processor_seconds?)
     }
 }
@@ -44,7 +56,7 @@ fn processor_seconds() -> Option<f64> {
 }
 
 /// Highest resident memory of this process, where Linux reports it.
-pub fn peak_memory_bytes() -> Option<u64> {
+fn peak_memory_bytes() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
     let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;

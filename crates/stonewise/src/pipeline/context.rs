@@ -4,12 +4,12 @@ use crate::error::Result;
 use crate::files::{create_results_folder, read_json, write_json};
 use crate::output::OutputFolder;
 use crate::pipeline::agenda::Agenda;
-use crate::pipeline::clock::{Clock, peak_memory_bytes};
+use crate::pipeline::clock::Clock;
 use crate::project::Project;
 use crate::results::names::WORK_DIR;
 use crate::results::records::StepTime;
-use crate::storage::step::{Key, StepDir};
-use crate::storage::store::{Keeps, Origin, StepStore};
+use crate::storage::step::{Key, Origin, StepDir};
+use crate::storage::store::{Keeps, StepStore};
 use crate::warnings::{Warning, Warnings};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -61,11 +61,9 @@ impl<'a> Context<'a> {
     /// Makes the folders of a run that keeps its steps beside its results.
     pub fn new(project: &'a Project, output: &'a OutputFolder, progress: &'a dyn Progress) -> Result<Self> {
         let store = StepStore::new(&output.path().join(WORK_DIR), Keeps::Newest)?;
-        let context = Self::with_store(project, output.path(), Arc::new(store), progress)?;
-        Ok(Self {
-            output: Some(output),
-            ..context
-        })
+        let mut context = Self::with_store(project, output.path(), Arc::new(store), progress)?;
+        context.output = Some(output);
+        Ok(context)
     }
 
     /// The context of a process that does one unit of a plan.
@@ -76,11 +74,9 @@ impl<'a> Context<'a> {
         progress: &'a dyn Progress,
     ) -> Result<Self> {
         let store = StepStore::of_unit(&output.path().join(WORK_DIR), digests)?;
-        let context = Self::with_store(project, output.path(), Arc::new(store), progress)?;
-        Ok(Self {
-            output: Some(output),
-            ..context
-        })
+        let mut context = Self::with_store(project, output.path(), Arc::new(store), progress)?;
+        context.output = Some(output);
+        Ok(context)
     }
 
     /// The context of a run whose steps lie in a store that other runs may share.
@@ -205,13 +201,9 @@ impl<'a> Context<'a> {
 
     fn record(&self, step: &str, started: Clock, resumed: bool) {
         let by_unit = self.unit_times.get(step).filter(|_| resumed);
-        let time = by_unit.cloned().unwrap_or_else(|| StepTime {
-            step: step.to_owned(),
-            seconds: started.wall_seconds(),
-            processor_seconds: started.processor_seconds(),
-            resumed,
-            peak_memory_bytes: peak_memory_bytes(),
-        });
+        let time = by_unit
+            .cloned()
+            .unwrap_or_else(|| started.step_time(step, resumed));
         self.times
             .lock()
             .unwrap_or_else(PoisonError::into_inner)

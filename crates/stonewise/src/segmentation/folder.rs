@@ -3,8 +3,8 @@
 use super::overlay::outlined;
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json, write_readable_json};
-use crate::storage::step::{Key, path_digest};
-use crate::storage::store::{Keeps, Origin, StepStore};
+use crate::storage::step::{Key, Origin, path_digest};
+use crate::storage::store::{Keeps, StepStore};
 use crate::warnings::{Warning, Warnings};
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -13,6 +13,7 @@ use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+use std::time::UNIX_EPOCH;
 use stonewise_io::atomic::partial_name;
 
 /// Digest of everything that a step's result depends on.
@@ -47,15 +48,15 @@ pub struct StepDir {
     key: Key,
 }
 
-/// What is known of a step's files.
+/// Where a step's files come from.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum State {
-    /// They are still to be made.
-    Unfinished,
-    /// All are there, as they were left.
-    Done,
-    /// Something differs from how it was left, for this reason.
-    Damaged(String),
+pub enum Origin {
+    /// They are made now.
+    Made,
+    /// An earlier run made them, and they are as it left them.
+    Found,
+    /// An earlier run made them, and they are not as it left them, for this reason: they are made again.
+    MadeAgain(String),
 }
 
 /// How closely a step's files are looked at before they are taken over.
@@ -92,7 +93,7 @@ impl StepDir {
         make(&begun.0)?;
         begun.0.finish(published)?;
         match fs::rename(&begun.0.path, &self.path) {
-            Err(error) if self.state(published, Look::Lengths) != State::Done => {
+            Err(error) if self.origin(published, Look::Lengths) != Origin::Found => {
                 Err(Error::io("putting a finished step in place", &self.path)(error))
             }
             _ => Ok(()),
@@ -105,16 +106,16 @@ impl StepDir {
     }
 
     /// Compares the step's files with what `done` says of them.
-    pub(super) fn state(&self, published: &[PathBuf], look: Look) -> State {
+    pub(super) fn origin(&self, published: &[PathBuf], look: Look) -> Origin {
         if !self.path.exists() {
-            return State::Unfinished;
+            return Origin::Made;
         }
         let Some(kept) = self.record() else {
-            return State::Damaged(format!("{} is missing or damaged", self.file(DONE).display()));
+            return Origin::MadeAgain(format!("{} is missing or damaged", self.file(DONE).display()));
         };
         let inside = kept.len().checked_sub(published.len());
         let Some((own, outside)) = inside.map(|n| kept.split_at(n)) else {
-            return State::Damaged(format!("{} is damaged", self.file(DONE).display()));
+            return Origin::MadeAgain(format!("{} is damaged", self.file(DONE).display()));
         };
         let own = own.iter().map(|k| (k, self.file(&k.file)));
         let outside = outside.iter().zip(published.iter().cloned());
@@ -123,8 +124,8 @@ impl StepDir {
             Look::Digests => kept.differs(&path),
         };
         match own.chain(outside).find_map(differs) {
-            Some(why) => State::Damaged(why),
-            None => State::Done,
+            Some(why) => Origin::MadeAgain(why),
+            None => Origin::Found,
         }
     }
 
@@ -196,6 +197,24 @@ impl Drop for Begun {
 /// folder above itself is left out.
 pub fn path_digest(path: &Path) -> Result<String> {
     digest_below(path, &mut Vec::new())
+}
+
+/// Digest of the names and lengths of a file, or of all files of a folder and below, and with `times` of their
+/// times of change; their content is not read.
+pub fn look_of(path: &Path, times: bool) -> Result<String> {
+    let files = match path.is_dir() {
+        true => files_of(path, &[])?,
+        false => vec![path.to_path_buf()],
+    };
+    let look = |file: PathBuf| {
+        let data = fs::metadata(&file).map_err(Error::io("reading", &file))?;
+        let time = data.modified().ok().filter(|_| times);
+        // Machines that share a folder may see fractions of a second differently.
+        let seconds = time.and_then(|t| Some(t.duration_since(UNIX_EPOCH).ok()?.as_secs()));
+        Ok((file, data.len(), seconds))
+    };
+    let looks = files.into_iter().map(look).collect::<Result<Vec<_>>>()?;
+    Ok(Key::new("look", &looks, &[]).as_str().to_owned())
 }
 
 /// `above`: the folders that lead here, without links.

@@ -1,6 +1,6 @@
 //! Steps that keep their results and resume, in the folders of a store.
 
-use super::step::{Key, Look, State, StepDir, discard, path_digest};
+use super::step::{Key, Look, Origin, StepDir, discard, path_digest};
 use crate::error::{Error, Result};
 use crate::files::create_results_folder;
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,17 +17,6 @@ pub enum Keeps {
     Newest,
     /// One for each key. For experiments, whose variants share what they have in common.
     Every,
-}
-
-/// Where a step's files come from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Origin {
-    /// They were made now.
-    Made,
-    /// An earlier run made them, and they are as it left them.
-    Found,
-    /// An earlier run made them, and they were not as it left them, for this reason: they were made again.
-    MadeAgain(String),
 }
 
 /// The folder that holds the folders of all steps: that of each version is named after its key.
@@ -117,12 +106,7 @@ impl StepStore {
         if self.sound().contains(dir.path()) && published.is_empty() {
             return Ok((dir, Origin::Found));
         }
-        let origin = match dir.state(published, self.look) {
-            State::Done => Origin::Found,
-            State::Unfinished => Origin::Made,
-            State::Damaged(why) => Origin::MadeAgain(why),
-        };
-
+        let origin = dir.origin(published, self.look);
         if origin != Origin::Found {
             if self.keeps == Keeps::Newest {
                 self.remove_versions(dir.path().parent(), Some(dir.path()))?;
@@ -175,9 +159,9 @@ impl StepStore {
         self.sound.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether this process does one unit of a plan.
-    pub fn is_of_unit(&self) -> bool {
-        self.look == Look::Lengths
+    /// Whether a step was done under this key, in whatever state its files are now.
+    pub fn has(&self, folder: &str, key: &Key) -> bool {
+        self.path(folder, key).exists()
     }
 
     /// Digest of an input file or folder, read once.

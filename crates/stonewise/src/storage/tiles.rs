@@ -90,10 +90,14 @@ impl DiskTiles {
         &self.tiles[tile].name
     }
 
+    fn columns(&self, tile: usize, names: &[&str]) -> Result<Table> {
+        let path = self.dir.join(format!("{}.parquet", self.tiles[tile].name));
+        Ok(read_columns(&path, names)?)
+    }
+
     /// Where the points of a tile came from, in the order of its points.
     pub fn provenance(&self, tile: usize) -> Result<Provenance> {
-        let path = self.dir.join(format!("{}.parquet", self.tiles[tile].name));
-        let table = read_columns(&path, &["file", "index"])?;
+        let table = self.columns(tile, &["file", "index"])?;
         Ok(Provenance {
             file: table.required("file")?.to_vec(),
             index: table.required("index")?.to_vec(),
@@ -118,8 +122,7 @@ impl DiskTiles {
 
     /// Source and time of the points of a tile, in the order of its points.
     pub fn origins(&self, tile: usize) -> Result<TileOrigins> {
-        let path = self.dir.join(format!("{}.parquet", self.tiles[tile].name));
-        let table = read_columns(&path, &["source", "time"])?;
+        let table = self.columns(tile, &["source", "time"])?;
         Ok(TileOrigins {
             source: table.required("source")?.to_vec(),
             time_s: table.required("time")?.to_vec(),
@@ -150,11 +153,7 @@ impl TileSource for DiskTiles {
         if let Some(cloud) = found {
             return Ok((*cloud).clone());
         }
-        let entry = &self.tiles[tile];
-        let table = read_columns(
-            &self.dir.join(format!("{}.parquet", entry.name)),
-            &["x", "y", "z"],
-        )?;
+        let table = self.columns(tile, &["x", "y", "z"])?;
         let (x, y, z) = (
             table.required::<f32>("x")?,
             table.required("y")?,
@@ -162,7 +161,7 @@ impl TileSource for DiskTiles {
         );
 
         let offsets = x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z]).collect();
-        let cloud = Cloud::new(entry.origin, offsets);
+        let cloud = Cloud::new(self.tiles[tile].origin, offsets);
         let cloud = Arc::new(match &self.frame {
             Some(frame) => Cloud::from_world(
                 frame * cloud.origin(),
@@ -201,8 +200,7 @@ impl TileValues {
 impl DiskTiles {
     /// Colours and intensities of the points of a tile, of an epoch whose tiles keep them.
     pub fn values(&self, tile: usize) -> Result<TileValues> {
-        let path = self.dir.join(format!("{}.parquet", self.tiles[tile].name));
-        let table = read_columns(&path, &["red", "green", "blue", "intensity", "source"])?;
+        let table = self.columns(tile, &["red", "green", "blue", "intensity", "source"])?;
         let [red, green, blue]: [&[u16]; 3] = [
             table.required("red")?,
             table.required("green")?,

@@ -61,20 +61,15 @@ fn write_clouds(
     let folder = context.out.join(epoch_dir(id.number()));
     fs::create_dir_all(&folder).map_err(Error::io("making a folder", &folder))?;
     let names = cloud_names(id.number(), &epoch.clouds);
-    if let Some(output) = context.output {
-        names.iter().try_for_each(|name| output.bring_back(name))?;
-    }
     let outputs: Vec<PathBuf> = names.iter().map(|name| context.out.join(name)).collect();
     let motions = rows.map_or_else(BTreeMap::new, motions);
     let key = Key::new("clouds", &format!("{motions:?}"), &[labelled.key.as_str()]);
     let name = format!("clouds-{id}");
+    // Clouds of the last run are needed where it did this step.
+    if let Some(output) = context.output.filter(|_| context.store.has(&name, &key)) {
+        names.iter().try_for_each(|name| output.bring_back(name))?;
+    }
     context.step_in(&name, &name, key, &outputs, |_, _| {
-        // Of two processes that do the same unit the slower one must not take away what the other has
-        // finished.
-        let removes = !context.store.is_of_unit();
-        for stale in outputs.iter().filter(|o| removes && o.exists()) {
-            fs::remove_file(stale).map_err(Error::io("removing a cloud of an earlier run", stale))?;
-        }
         for (file, (input, output)) in epoch.clouds.iter().zip(&outputs).enumerate() {
             let stones = stones_of_file(labelled, file as u32)?;
             let columns = if rows.is_some() {

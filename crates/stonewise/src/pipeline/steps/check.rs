@@ -5,8 +5,7 @@ use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::graph::{Run, Step};
-use crate::pipeline::steps::segment::listing;
-use crate::storage::step::Key;
+use crate::storage::step::{Key, look_of};
 use stonewise_core::epoch::EpochId;
 
 /// A look at the survey before the work.
@@ -48,7 +47,7 @@ pub fn look(context: &Context, forced: bool) -> Result<()> {
             inputs.push(context.digest(cloud)?);
         }
         if let Some(photos) = &epoch.photos {
-            inputs.extend([context.digest(&photos.cameras)?, listing(&photos.images)?]);
+            inputs.extend([context.digest(&photos.cameras)?, look_of(&photos.images, false)?]);
         }
     }
 

@@ -1,15 +1,12 @@
 //! The inputs of a plan: what they hold, and whether they are still the same.
 
 use crate::error::{Error, Result};
-use crate::kept::files_of;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::segment::photo_files;
-use crate::storage::step::Key;
+use crate::storage::step::look_of;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::UNIX_EPOCH;
 
 /// An input as the plan lists it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,7 +40,7 @@ pub(super) fn inputs_of(context: &Context) -> Result<Vec<PlannedInput>> {
     used.into_iter()
         .map(|path| {
             Ok(PlannedInput {
-                look: look_of(&path)?,
+                look: look_of(&path, true)?,
                 blake3: context.digest(&path)?,
                 path,
             })
@@ -54,7 +51,7 @@ pub(super) fn inputs_of(context: &Context) -> Result<Vec<PlannedInput>> {
 /// Digests of the inputs, if all of them are as they were; `plan`: the file to name otherwise.
 pub(super) fn unchanged(inputs: &[PlannedInput], plan: &Path) -> Result<BTreeMap<PathBuf, String>> {
     for input in inputs {
-        if look_of(&input.path).ok().as_deref() != Some(&input.look) {
+        if look_of(&input.path, true).ok().as_deref() != Some(&input.look) {
             return Err(Error::Plan {
                 path: plan.to_path_buf(),
                 message: format!(
@@ -68,24 +65,4 @@ pub(super) fn unchanged(inputs: &[PlannedInput], plan: &Path) -> Result<BTreeMap
         .iter()
         .map(|i| (i.path.clone(), i.blake3.clone()))
         .collect())
-}
-
-fn look_of(path: &Path) -> Result<String> {
-    let files = match path.is_dir() {
-        true => files_of(path, &[])?,
-        false => vec![path.to_path_buf()],
-    };
-    let looks = files
-        .into_iter()
-        .map(|file| {
-            let data = fs::metadata(&file).map_err(Error::io("reading", &file))?;
-            let time = data
-                .modified()
-                .ok()
-                .and_then(|t| t.duration_since(UNIX_EPOCH).ok());
-            // Machines that share a folder may see fractions of a second differently.
-            Ok((file, data.len(), time.map(|t| t.as_secs())))
-        })
-        .collect::<Result<Vec<_>>>()?;
-    Ok(Key::new("look", &looks, &[]).as_str().to_owned())
 }

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::files::write_json;
-use crate::pipeline::clock::{Clock, peak_memory_bytes};
+use crate::pipeline::clock::Clock;
 use crate::results::names::WORK_DIR;
 use crate::results::records::StepTime;
 use serde::{Deserialize, Serialize};
@@ -23,23 +23,19 @@ pub(super) struct Receipt {
     pub unit: String,
     /// The plan that it was done for.
     pub plan: String,
-    /// Wall time, seconds.
-    pub seconds: f64,
-    /// Processor time of all threads, seconds; absent where the system does not report it.
-    pub processor_seconds: Option<f64>,
-    /// Highest memory of the process, bytes; absent where the system does not report it.
-    pub peak_memory_bytes: Option<u64>,
+    /// What it took of its step.
+    #[serde(flatten)]
+    pub time: StepTime,
 }
 
 impl Receipt {
     /// Notes that a unit is done which began with the clock.
     pub fn write(out: &Path, plan: &str, unit: &str, clock: &Clock) -> Result<()> {
+        let step = unit.split('.').next().unwrap_or_default();
         let receipt = Self {
             unit: unit.to_owned(),
             plan: plan.to_owned(),
-            seconds: clock.wall_seconds(),
-            processor_seconds: clock.processor_seconds(),
-            peak_memory_bytes: peak_memory_bytes(),
+            time: clock.step_time(step, false),
         };
         let path = out.join(receipt_file(unit));
         let folder = path.parent().unwrap_or(out);
@@ -99,21 +95,16 @@ pub(super) fn times<'a>(
     units: impl Iterator<Item = &'a str>,
 ) -> BTreeMap<String, StepTime> {
     let mut times: BTreeMap<String, StepTime> = BTreeMap::new();
-    for receipt in units.filter_map(|unit| Receipt::read(out, plan, unit)) {
-        let step = receipt.unit.split('.').next().unwrap_or_default().to_owned();
-        let time = times.entry(step.clone()).or_insert(StepTime {
-            step,
-            seconds: 0.0,
-            processor_seconds: Some(0.0),
-            resumed: false,
-            peak_memory_bytes: None,
-        });
-        time.seconds += receipt.seconds;
-        time.processor_seconds = time
-            .processor_seconds
-            .zip(receipt.processor_seconds)
-            .map(|(a, b)| a + b);
-        time.peak_memory_bytes = time.peak_memory_bytes.max(receipt.peak_memory_bytes);
+    for Receipt { time, .. } in units.filter_map(|unit| Receipt::read(out, plan, unit)) {
+        match times.get_mut(&time.step) {
+            None => drop(times.insert(time.step.clone(), time)),
+            Some(all) => {
+                all.seconds += time.seconds;
+                let processor_seconds = all.processor_seconds.zip(time.processor_seconds);
+                all.processor_seconds = processor_seconds.map(|(a, b)| a + b);
+                all.peak_memory_bytes = all.peak_memory_bytes.max(time.peak_memory_bytes);
+            }
+        }
     }
     times
 }

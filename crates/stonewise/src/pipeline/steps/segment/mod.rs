@@ -4,19 +4,18 @@ mod detector;
 mod masks;
 mod voting_photo;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::cost::{Cost, Sizes};
 use crate::pipeline::graph::{About, Need, Photos, Run, Step};
 use crate::pipeline::steps::ingest::INGEST;
 use crate::pipeline::steps::views::VIEWS;
 use crate::project::{Epoch, Project};
-use crate::storage::step::{Key, StepDir};
+use crate::storage::step::{Key, StepDir, look_of};
 use crate::warnings::Warnings;
 use detector::Detection;
 use masks::write_labels;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::View;
@@ -107,7 +106,8 @@ fn segment(run: &Run, id: EpochId) -> Result<Segmented> {
             let digests = [
                 context.digest(&files.cameras)?,
                 context.digest(masks)?,
-                listing(&files.images)?,
+                // Masks, not photos, decide the labels.
+                look_of(&files.images, false)?,
             ];
             let key = Key::new(STEP, &(), &digests.each_ref().map(String::as_str));
             context.step(&format!("{STEP}-{id}"), key, |step, warnings| {
@@ -151,16 +151,4 @@ fn photos_to_segment(project: &Project, epoch: EpochId) -> Result<usize> {
 pub fn photo_files(epoch: &Epoch) -> Result<Vec<PathBuf>> {
     let posed = posed_photos(epoch, &Warnings::default())?;
     Ok(posed.into_iter().map(|(_, path)| path).collect())
-}
-
-/// Digest of the names and sizes of a folder's files: masks, not photos, decide the labels.
-pub(in crate::pipeline) fn listing(folder: &Path) -> Result<String> {
-    let mut entries = fs::read_dir(folder)
-        .and_then(|all| {
-            all.map(|e| e.and_then(|e| Ok((e.path(), e.metadata()?.len()))))
-                .collect::<std::io::Result<Vec<_>>>()
-        })
-        .map_err(Error::io("listing", folder))?;
-    entries.sort();
-    Ok(Key::new("listing", &entries, &[]).as_str().to_owned())
 }
