@@ -62,7 +62,7 @@ def parse():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", help="folder for the data; a temporary one when absent")
     parser.add_argument("--points", type=float, default=2.7e6, help="points of the made-up wall in each epoch")
-    parser.add_argument("--clouds", nargs=2, help="two clouds in place of the made-up wall; no stones and photos then")
+    parser.add_argument("--clouds", nargs=2, help="two clouds in place of the made-up wall; no stones then")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--program", default=ROOT / "target/release/lab", type=Path)
     return parser.parse_args()
@@ -75,7 +75,6 @@ def cases(made_up):
     if made_up:
         yield "paper's estimator, 60 cm, all points", "gicp", "gicp"
         yield "the same, voxels of 1 cm", "gicp-voxel", "gicp"
-        yield "label, units: points x photos", "label", None
     yield "LAZ decoding", "laz", "laz"
     yield "LAZ to tiles", "tiles", "tiles"
 

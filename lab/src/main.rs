@@ -4,9 +4,7 @@ mod adjustment;
 mod coverage;
 mod deformation;
 mod detector;
-mod epoch_errors;
 mod figures;
-mod photo_curves;
 mod projjson;
 mod sample_report;
 mod series;
@@ -24,23 +22,19 @@ type Outcome = Result<(), Box<dyn std::error::Error>>;
 /// Name and start of a program.
 type Program = (&'static str, fn(&Words) -> Outcome);
 
-const PROGRAMS: [Program; 19] = [
+const PROGRAMS: [Program; 15] = [
     ("adjustment", adjustment::run),
     ("coverage", coverage::run),
     ("deformation", deformation::run),
     ("series", series::run),
     ("series-time", speed::series_time::run),
-    ("epoch-errors", epoch_errors::run),
-    ("photo-curves", photo_curves::run),
     ("projjson", projjson::run),
     ("kept-walls", detector::kept_walls::run),
-    ("masonry-sheet", detector::masonry_sheet::run),
     ("overfit", detector::overfit::run),
     ("step-time", detector::step_time::run),
     ("training-crops", detector::training_crops::run),
     ("instances", detector::instances::run),
     ("comparisons", speed::comparisons::run),
-    ("machine", speed::machine::run),
     ("tiles", speed::tiles::run),
     ("clouds", speed::clouds::run),
     ("sample-report", sample_report::run),

@@ -2,7 +2,6 @@
 
 pub mod instances;
 pub mod kept_walls;
-pub mod masonry_sheet;
 pub mod overfit;
 pub mod step_time;
 pub mod training_crops;

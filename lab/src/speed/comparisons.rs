@@ -1,4 +1,4 @@
-//! Processor time of the searches, comparisons, transfers and decoding that other programs do too.
+//! Processor time of the searches, comparisons and decoding that other programs do too.
 //!
 //! `cargo run --release -p stonewise-lab -- comparisons FOLDER`, with FOLDER as `lab/speed.py` makes it. It
 //! reads the names of cases from standard input, one a line, runs each and answers `seconds processor_seconds
@@ -8,7 +8,6 @@
 //! a wall that looks along -y), `core.f64` (core points of M3C2), `stones.f64` (centres of stones). `first.laz`, the
 //! first cloud, serves only the case `laz`.
 
-use super::photos::Photos;
 use super::survey::Survey;
 use crate::Outcome;
 use crate::figures::processor_seconds;
@@ -23,7 +22,6 @@ pub fn run(words: &Words) -> Outcome {
     let survey = Survey::read(folder);
     for case in std::io::stdin().lock().lines() {
         let case = case?;
-        let photos = (case == "label").then(|| Photos::new(&survey));
         let (wall, processor) = (Instant::now(), processor_seconds());
         let (units, values) = match case.as_str() {
             "c2c" => survey.c2c(),
@@ -31,7 +29,6 @@ pub fn run(words: &Words) -> Outcome {
             "gicp" => survey.gicp(0.0),
             "gicp-voxel" => survey.gicp(0.01),
             "laz" => points_of_laz(folder)?,
-            "label" => photos.unwrap().label(),
             _ => (0, Vec::new()),
         };
         println!(

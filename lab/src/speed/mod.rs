@@ -2,8 +2,6 @@
 
 pub mod clouds;
 pub mod comparisons;
-pub mod machine;
-mod photos;
 pub mod series_time;
 mod survey;
 pub mod tiles;

@@ -5,5 +5,5 @@ mod points;
 mod scanned_wall;
 
 pub use dam_small::{read_points, read_stones};
-pub use points::{LEAST_POINTS, Places, Points, SurveyPoint, mean, pairs, places, seen_stone};
+pub use points::{Places, mean, pairs, places};
 pub use scanned_wall::{ScannedWall, sources};
