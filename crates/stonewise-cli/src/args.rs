@@ -3,7 +3,7 @@
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use std::path::PathBuf;
-use stonewise::experiment::{Dimension, Influence};
+use stonewise::experiment::Dimension;
 
 /// Measures how a masonry dam moves, stone by stone, from point clouds and posed photos.
 #[derive(Debug, Parser)]
@@ -155,7 +155,7 @@ pub enum Command {
         --grid registration.estimator=gicp --grid registration.gicp.buffer_m=0,0.3,0.6"
     )]
     Tune(TuneArgs),
-    /// Repeat the paper's experiment, or measure how the results depend on masks, noise, spacing and so on.
+    /// Repeat the paper's experiment.
     #[command(subcommand)]
     Experiment(ExperimentCommand),
     /// Describe the content of a cloud, photos, a camera file, a mask file or a project.
@@ -560,33 +560,6 @@ pub enum ExperimentCommand {
         stonewise experiment paper TLS=survey/stonewise.toml UAV=survey/stonewise_uav.toml --out paper/"
     )]
     Paper(PaperArgs),
-    /// Plot the error and the number of stones measured against mask quality, noise, spacing, motion, pose
-    /// error and overlap.
-    #[command(
-        after_help = "Examples:\n  stonewise experiment sensitivity --out curves/\n  \
-        stonewise experiment sensitivity --influence masks --influence pose --seeds 3 --out curves/"
-    )]
-    Sensitivity(SensitivityArgs),
-}
-
-/// Arguments of `experiment sensitivity`.
-#[derive(Debug, ClapArgs)]
-pub struct SensitivityArgs {
-    /// Folder of the page, the curves and the steps; created if missing.
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
-    /// What to vary: masks, noise, spacing, motion, pose or overlap; may be repeated (default: all).
-    #[arg(long, value_name = "WHAT")]
-    pub influence: Vec<Influence>,
-    /// Width and height of the simulated walls, metres.
-    #[arg(long, value_name = "WxH", default_value = "3x2", value_parser = parse_size)]
-    pub size: [f64; 2],
-    /// Number of simulated walls.
-    #[arg(long, default_value_t = 1)]
-    pub seeds: u64,
-    /// Measure also with the paper's matching and estimator.
-    #[arg(long)]
-    pub with_paper: bool,
 }
 
 /// Arguments of `experiment paper`.

@@ -11,6 +11,7 @@
 mod args;
 mod commands;
 mod counted;
+mod gone;
 mod note;
 mod printer;
 mod screen;
@@ -42,6 +43,9 @@ pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> u8 {
         Err(error) => {
             // A closed stream is no reason to fail.
             let _ = error.print();
+            if let Some(instead) = gone::instead(&words).filter(|_| error.use_stderr()) {
+                note::note(instead);
+            }
             if error.kind() == ErrorKind::DisplayVersion && words.iter().any(|word| word == "--verbose") {
                 let _ = write!(std::io::stdout(), "{}", commands::version_details());
             }

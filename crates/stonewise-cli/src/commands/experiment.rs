@@ -1,16 +1,13 @@
 //! `experiment`.
 
-use crate::args::{ExperimentCommand, PaperArgs, SensitivityArgs};
+use crate::args::{ExperimentCommand, PaperArgs};
 use crate::commands::{Outcome, part::part, simulate};
-use crate::counted::counted;
 use crate::printer::Printer;
 use crate::stdout::stdout;
 use anyhow::{Result, bail};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use stonewise::experiment::{
-    PaperOptions, PaperSurvey, SensitivityOptions, paper as run_paper, sensitivity as run_sensitivity,
-};
+use stonewise::experiment::{PaperOptions, PaperSurvey, paper as run_paper};
 use stonewise::{OutputFolder, Owner, Project};
 use stonewise_simulate::SurveyParams;
 
@@ -18,7 +15,6 @@ use stonewise_simulate::SurveyParams;
 pub fn experiment(which: &ExperimentCommand, force: bool, printer: &Printer) -> Result<Outcome> {
     match which {
         ExperimentCommand::Paper(args) => paper(args, force, printer),
-        ExperimentCommand::Sensitivity(args) => sensitivity(args, force, printer),
     }
 }
 
@@ -51,25 +47,6 @@ fn paper(args: &PaperArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     printer.finish();
     write!(stdout(), "{}", tables.markdown())?;
     printer.log(&format!("open {}", args.out.join("index.html").display()));
-    Ok(Outcome::Done)
-}
-
-/// Curves of what the results depend on.
-fn sensitivity(args: &SensitivityArgs, force: bool, printer: &Printer) -> Result<Outcome> {
-    let options = SensitivityOptions {
-        influences: args.influence.clone(),
-        size_m: args.size,
-        seeds: args.seeds,
-        with_paper: args.with_paper,
-    };
-    let owner = Owner::inputs("experiment sensitivity", &[]);
-    let folder = OutputFolder::of_inputs(&args.out, &owner, &[], &[], force)?;
-    let points = run_sensitivity(&options, folder.path(), printer)?;
-    printer.log(&format!(
-        "{} of curves: open {}",
-        counted(points.len(), "point"),
-        args.out.join("index.html").display()
-    ));
     Ok(Outcome::Done)
 }
 

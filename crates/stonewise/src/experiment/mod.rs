@@ -1,4 +1,4 @@
-//! Experiments: what becomes of the results when parameters, masks, noise or motions change.
+//! Experiments: what becomes of the results under known motions, other parameters or another survey.
 //!
 //! Every variant is an ordinary run of a project. All runs of an experiment share a store of steps, so that
 //! what variants have in common is done once, and an interrupted experiment goes on where it stopped.
@@ -11,7 +11,6 @@ mod inner_work;
 mod known_motion;
 mod paper;
 mod predicted;
-mod sensitivity;
 mod settings_with;
 mod simulation;
 mod survey_plan;
@@ -21,7 +20,6 @@ pub use baseline::Baseline;
 pub use certify::{Certificate, CertifyOptions, Figure, certify};
 pub use design::{Design, design};
 pub use paper::{Detail, PaperOptions, PaperSurvey, PaperTables, Segmented, paper};
-pub use sensitivity::{Influence, SensitivityOptions, SensitivityPoint, sensitivity};
 pub use simulation::not_simulated;
 pub use survey_plan::{
     PlanDesign, PlannedDrone, PlannedInstrument, PlannedPhotos, PlannedRegistration, PlannedStation,

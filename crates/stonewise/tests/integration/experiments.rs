@@ -4,9 +4,7 @@
 use nalgebra::Vector3;
 use std::fs;
 use std::path::Path;
-use stonewise::experiment::{
-    Influence, PaperOptions, PaperSurvey, SensitivityOptions, TuneOptions, paper, sensitivity, tune,
-};
+use stonewise::experiment::{PaperOptions, PaperSurvey, TuneOptions, paper, tune};
 use stonewise::{OutputFolder, Part, Project, Until, run};
 use stonewise_core::epoch::EpochId;
 use stonewise_core::evaluate::MotionField;
@@ -252,22 +250,4 @@ fn a_detector_learns_some_stones_is_measured_on_the_others_and_finds_all() {
         error.contains("epoch 1") && error.contains("--train-minutes"),
         "{error}"
     );
-}
-
-#[test]
-fn sensitivity_draws_a_curve_for_each_scanner() {
-    let dir = tempfile::tempdir().unwrap();
-    let options = SensitivityOptions {
-        influences: vec![Influence::Overlap],
-        size_m: [1.0, 0.8],
-        seeds: 1,
-        with_paper: false,
-    };
-    let points = sensitivity(&options, dir.path(), &Silent).unwrap();
-    assert_eq!(points.len(), 12);
-    let all = points.iter().find(|p| p.x == 8.0 && p.scanner == "TLS").unwrap();
-    assert!(all.stones[0] > 3 && all.found_share() >= 0.9, "{all:?}");
-    assert!(all.rmse_m[0] < 0.003, "{all:?}");
-    assert_eq!(column(&dir.path().join("sensitivity.csv"), "value").len(), 12);
-    assert!(dir.path().join("overlap-uav-share.svg").exists() && dir.path().join("index.html").exists());
 }

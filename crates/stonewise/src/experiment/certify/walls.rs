@@ -3,7 +3,6 @@
 use super::certificate::{CertifyOptions, Figure};
 use crate::error::{Error, Result};
 use crate::experiment::inner_work::InnerWork;
-use crate::experiment::sensitivity::base;
 use crate::experiment::simulation::not_simulated;
 use crate::pipeline::{Context, Until, run_in};
 use crate::project::Project;
@@ -14,11 +13,16 @@ use std::path::Path;
 use std::sync::Arc;
 use stonewise_core::evaluate::{Calibration, MotionScore};
 use stonewise_core::progress::Progress;
-use stonewise_simulate::{SurveyParams, TlsParams, WallMotion, write_survey};
+use stonewise_simulate::{
+    MaskFiles, PhotoParams, SceneParams, SurroundingsParams, SurveyParams, TlsParams, WallMotion, WallParams,
+    write_survey,
+};
 
 const PART: &str = "walls";
 /// Width and height of a wall, metres.
 const SIZE_M: [f64; 2] = [2.4, 1.6];
+/// A pixel of the photos on the wall, metres: the paper's.
+const PIXEL_M: f64 = 5.4e-3;
 /// Least share of true motions inside intervals that are to hold 95 %: stones of a wall are tied to each other, so
 /// that a few walls are few independent draws.
 const LEAST_COVERAGE: f64 = 0.9;
@@ -173,22 +177,38 @@ fn measured(
 
 /// A terrestrial survey of a small wall that stands still or bulges by 10 mm.
 fn survey(seed: u64, is_still: bool) -> SurveyParams {
-    let mut params = base(SIZE_M, seed);
-    params.name = format!("Wall {seed}");
-    params.scene.tls = Some(TlsParams {
-        datum_m: DATUM_M,
-        ..TlsParams::default()
-    });
-    params.scene.uav = None;
-    params.scene.motions = match is_still {
-        true => Vec::new(),
-        false => vec![WallMotion::Bulge {
-            centre_m: [0.0, 0.5 * SIZE_M[1]],
-            depth_m: 0.01,
-            diameter_m: 1.5,
-        }],
+    let dam = SurveyParams::dam(SIZE_M);
+    let side = |size_m: f64| ((size_m + 1.2) / PIXEL_M) as u32;
+    let bulge = WallMotion::Bulge {
+        centre_m: [0.0, 0.5 * SIZE_M[1]],
+        depth_m: 0.01,
+        diameter_m: 1.5,
     };
-    params
+    let params = SurveyParams {
+        name: format!("Wall {seed}"),
+        masks: MaskFiles::Png,
+        scene: SceneParams {
+            wall: WallParams::sized(SIZE_M),
+            surroundings: SurroundingsParams::none(),
+            motions: if is_still { Vec::new() } else { vec![bulge] },
+            tls: Some(TlsParams {
+                datum_m: DATUM_M,
+                ..TlsParams::default()
+            }),
+            uav: None,
+            ..SceneParams::default()
+        },
+        photos: PhotoParams {
+            columns: 4,
+            rows: 2,
+            width: side(SIZE_M[0]),
+            height: side(SIZE_M[1]),
+            rendered: false,
+            ..dam.photos.clone()
+        },
+        ..dam
+    };
+    params.seeded(seed)
 }
 
 #[cfg(test)]
