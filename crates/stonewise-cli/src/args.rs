@@ -138,8 +138,8 @@ pub enum Command {
         A project of one epoch is enough. A plan has [wall] and [[stations]]. The figures go to stdout as JSON."
     )]
     Design(DesignArgs),
-    /// Certify this program on this machine: data with published results, simulated walls, and, with a project,
-    /// motions put into its own scans.
+    /// Certify this program on this machine: on simulated walls, and, with a project, on motions put into its own
+    /// scans.
     #[command(after_help = "Examples:\n  stonewise certify --out certificate/\n  \
         stonewise certify survey/stonewise.toml --seed 7 --out certificate/\n\n\
         The figures go to stdout. Exit code 3 if one is outside what is allowed.")]

@@ -5,14 +5,14 @@ mod band;
 mod block;
 mod dense;
 mod fused;
-mod least_squares;
 mod selected_inverse;
+#[cfg(test)]
+mod tests;
 mod without_negative;
 
 pub(crate) use band::{Band, BandFactor, BandInverse};
 pub(crate) use block::{BlockFactor, BlockMatrix, BlockPattern};
 pub(crate) use dense::DenseFactor;
 pub(crate) use fused::{add_scaled, mul_add};
-pub use least_squares::least_squares;
 pub(crate) use selected_inverse::SelectedInverse;
 pub use without_negative::without_negative;

@@ -19,11 +19,11 @@ pub struct CertifyOptions {
 /// One figure with what is allowed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figure {
-    /// `solver`, `walls` or `own`.
+    /// `walls` or `own`.
     pub part: &'static str,
     /// What it is.
     pub name: String,
-    /// The figure; absent where words say it.
+    /// The figure; absent where it is not defined.
     pub value: Option<f64>,
     /// The least that is allowed.
     pub least: Option<f64>,
@@ -87,10 +87,6 @@ impl Figure {
             holds: true,
             ..Self::new(part, name, 0.0, [None, None])
         }
-    }
-
-    pub(super) fn said(part: &'static str, name: impl Into<String>, note: &str) -> Self {
-        Self::shown(part, name, None).with(note)
     }
 
     pub(super) fn with(mut self, note: impl Into<String>) -> Self {

@@ -1,11 +1,9 @@
-//! A certificate: what the program reaches on data whose truth is published, simulated or put in, on this
-//! machine, with tolerances stated beforehand.
+//! A certificate: what the program reaches where the truth is simulated or put in, on this machine, with
+//! tolerances stated beforehand.
 
 mod certificate;
-mod nist_data;
 mod own;
 mod page;
-mod solver;
 mod walls;
 
 use crate::error::Result;
@@ -30,8 +28,7 @@ const PAGE: &str = "certificate.html";
 /// What stops a simulation or a run. A figure outside its allowed range is not an error.
 pub fn certify(options: &CertifyOptions, out: &Path, progress: &dyn Progress) -> Result<Certificate> {
     let store = Arc::new(StepStore::new(&out.join("work"), Keeps::Every)?);
-    let mut figures = solver::figures();
-    figures.extend(walls::figures(options, out, &store, progress)?);
+    let mut figures = walls::figures(options, out, &store, progress)?;
     if let Some(project) = &options.project {
         figures.extend(own::figures(project, options.seed, out, &store, progress)?);
     }

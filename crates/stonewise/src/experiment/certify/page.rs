@@ -7,15 +7,7 @@ use crate::files::write_text;
 use std::path::Path;
 
 /// Parts in order: word, heading, explanation.
-const PARTS: [[&str; 3]; 3] = [
-    [
-        "solver",
-        "Least squares against certified results",
-        "NIST's Statistical Reference Datasets, through normal equations and the sparse Cholesky factor with which the stones are \
-         adjusted. Normal equations square the condition of a problem: sets as given lose about half of the digits that a QR \
-         factor keeps, and Filip cannot be solved. The adjustment takes every stone about its own centroid; the second figure \
-         of each set is of that kind.",
-    ],
+const PARTS: [[&str; 3]; 2] = [
     [
         "walls",
         "Simulated walls",
