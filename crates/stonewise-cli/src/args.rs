@@ -585,15 +585,6 @@ pub struct PaperArgs {
     /// part.
     #[arg(long, value_name = "PART")]
     pub paper_part: Option<String>,
-    /// Find the stones with a detector, as in the paper, and measure its precision and recall: the project's
-    /// detector is first trained on nine tenths of each photo's masks, for this many minutes in total; 0 uses
-    /// it without training. Repeat the command with a larger number to continue a finished training (default:
-    /// stones come from the masks).
-    #[arg(long, value_name = "MINUTES", value_parser = parse_minutes)]
-    pub train_minutes: Option<f64>,
-    /// Regions in which the masks are complete, for --train-minutes (default: everywhere).
-    #[arg(long, value_name = "FILE", requires = "train_minutes")]
-    pub valid: Option<PathBuf>,
 }
 
 /// Ready-made surveys.

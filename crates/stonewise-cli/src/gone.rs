@@ -3,11 +3,18 @@
 use std::ffi::OsString;
 
 /// Words that are gone, and what takes their place.
-const GONE: [(&str, &str); 1] = [(
-    "sensitivity",
-    "`experiment sensitivity` is gone: simulate a survey with each value (`stonewise simulate --params FILE`, the \
+const GONE: [(&str, &str); 2] = [
+    (
+        "sensitivity",
+        "`experiment sensitivity` is gone: simulate a survey with each value (`stonewise simulate --params FILE`, the \
          spacing is `spacing_m` in [scene.tls]), then `stonewise run` it and `stonewise evaluate --truth` the results",
-)];
+    ),
+    (
+        "--train-minutes",
+        "`--train-minutes` is gone: train the detector first (`stonewise train --data MASKS --images PHOTOS`), then name it \
+         in the project file ([segment] model) and leave out `masks`",
+    ),
+];
 
 /// What to do instead of the first of these words that is gone.
 pub fn instead(words: &[OsString]) -> Option<&'static str> {
@@ -29,6 +36,8 @@ mod tests {
         };
         let sensitivity = said("stonewise experiment sensitivity --out curves").unwrap();
         assert!(sensitivity.contains("stonewise simulate"), "{sensitivity}");
+        let trained = said("stonewise experiment paper --train-minutes=4 --out paper").unwrap();
+        assert!(trained.contains("stonewise train"), "{trained}");
         assert_eq!(said("stonewise run sensitivity.toml"), None);
     }
 }

@@ -7,7 +7,7 @@ use crate::stdout::stdout;
 use anyhow::{Result, bail};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use stonewise::experiment::{PaperOptions, PaperSurvey, paper as run_paper};
+use stonewise::experiment::{PaperSurvey, paper as run_paper};
 use stonewise::{OutputFolder, Owner, Project};
 use stonewise_simulate::SurveyParams;
 
@@ -22,8 +22,7 @@ pub fn experiment(which: &ExperimentCommand, force: bool, printer: &Printer) -> 
 fn paper(args: &PaperArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     // Read first, so that a project with a mistake claims no folder.
     let given: Vec<PaperSurvey> = args.surveys.iter().map(|s| survey(s)).collect::<Result<_>>()?;
-    let mut inputs: Vec<PathBuf> = given.iter().flat_map(|s| s.project.inputs()).collect();
-    inputs.extend(args.valid.clone());
+    let inputs: Vec<PathBuf> = given.iter().flat_map(|s| s.project.inputs()).collect();
     let files: Vec<PathBuf> = given.iter().map(|s| s.project.path.clone()).collect();
     let owner = Owner::inputs("experiment paper", &files);
     let folder = OutputFolder::of_inputs(&args.out, &owner, &inputs, &["work"], force)?;
@@ -37,13 +36,7 @@ fn paper(args: &PaperArgs, force: bool, printer: &Printer) -> Result<Outcome> {
             survey.paper_part = Some(part("--paper-part", text, &survey.project)?);
         }
     }
-    let options = PaperOptions {
-        epoch: args.epoch.clone(),
-        seed: args.seed,
-        train_minutes: args.train_minutes,
-        valid: args.valid.clone(),
-    };
-    let tables = run_paper(&surveys, &options, folder.path(), printer)?;
+    let tables = run_paper(&surveys, args.epoch.as_deref(), args.seed, folder.path(), printer)?;
     printer.finish();
     write!(stdout(), "{}", tables.markdown())?;
     printer.log(&format!("open {}", args.out.join("index.html").display()));

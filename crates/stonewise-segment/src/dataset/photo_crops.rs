@@ -71,15 +71,6 @@ impl<'a> PhotoCrops<'a> {
             .collect())
     }
 
-    /// A whole photo, by its index; everything but the blocks and stones kept for measuring is to be ignored.
-    ///
-    /// # Errors
-    /// The photo or its masks cannot be read.
-    pub fn held_out(&self, index: usize) -> Result<Sample, DatasetError> {
-        let photo = Photo::new(self.photos.sample(index)?);
-        Ok(self.split(&photo, index).for_validation(photo.sample()))
-    }
-
     /// Edge of a block, pixels of the photo: what an image shows that is measured on.
     fn block_px(&self, photo: &Photo) -> u32 {
         let sides = [photo.sample().image().width(), photo.sample().image().height()];

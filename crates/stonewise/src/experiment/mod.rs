@@ -14,12 +14,13 @@ mod predicted;
 mod settings_with;
 mod simulation;
 mod survey_plan;
+mod tables;
 mod tune;
 
 pub use baseline::Baseline;
 pub use certify::{Certificate, CertifyOptions, Figure, certify};
 pub use design::{Design, design};
-pub use paper::{Detail, PaperOptions, PaperSurvey, PaperTables, Segmented, paper};
+pub use paper::{PaperSurvey, PaperTables, paper};
 pub use simulation::not_simulated;
 pub use survey_plan::{
     PlanDesign, PlannedDrone, PlannedInstrument, PlannedPhotos, PlannedRegistration, PlannedStation,

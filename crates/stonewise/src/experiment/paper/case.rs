@@ -3,7 +3,6 @@
 use crate::experiment::known_motion::KnownMotion;
 use crate::results::ResultSet;
 use crate::settings::{Estimator, Settings};
-use std::path::PathBuf;
 use stonewise_core::evaluate::MotionScore;
 use stonewise_core::matching::MatchParams;
 
@@ -48,26 +47,22 @@ pub(super) struct Case {
     pub survey: String,
     pub motion: KnownMotion,
     pub method: Method,
+    pub settings: Settings,
     pub results: ResultSet,
-    /// All stones.
-    pub stones: MotionScore,
-    /// M3C2 at its core points.
-    pub m3c2: MotionScore,
-    /// Scores of stones and of M3C2 in the place that moves, where only a part does.
+    /// Scores of the stones and of M3C2 at its core points.
+    pub all: [MotionScore; 2],
+    /// The same in the place that moves, where only a part does.
     pub inside: Option<[MotionScore; 2]>,
 }
 
-/// A name as a folder: letters, digits, dashes.
-pub(super) fn file_name(name: &str) -> PathBuf {
-    let plain: String = name
-        .chars()
-        .map(|c| {
-            if c.is_alphanumeric() {
-                c.to_ascii_lowercase()
-            } else {
-                '-'
-            }
-        })
-        .collect();
-    plain.into()
+/// A name as a file or folder: letters, digits, dashes.
+pub(super) fn file_name(name: &str) -> String {
+    let plain = |c: char| {
+        if c.is_alphanumeric() {
+            c.to_ascii_lowercase()
+        } else {
+            '-'
+        }
+    };
+    name.chars().map(plain).collect()
 }

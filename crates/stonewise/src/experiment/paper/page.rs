@@ -1,35 +1,28 @@
 //! The page of the experiment and its files.
 
-use super::case::{Method, file_name};
-use super::figures;
-use super::outcome::Outcome;
-use super::tables::{PARAMETER_HEAD, PaperTables, RMSE_HEAD, SEGMENTATION_HEAD};
+use super::case::Case;
+use super::figures::figures;
+use super::tables::PaperTables;
 use crate::error::{Error, Result};
-use crate::figure::{Page, Plot, jpeg_element, table};
+use crate::experiment::tables::TextTable;
+use crate::figure::{Page, jpeg_element};
 use crate::files::write_text;
 use std::fs;
 use std::path::Path;
 use stonewise_io::table::write_csv;
 
 /// What `table2.csv` as a whole holds.
-const TABLE2: &str = "One row per method, survey, motion and region.";
+const TABLE_2: &str = "One row per method, survey, motion and region.";
 
-/// What `segmentation.csv` as a whole holds.
-const SEGMENTATION: &str =
-    "One row per detector and set of labelled photos: figures on the stones held out of training.";
-
-/// Writes everything that the experiment came to.
-pub(super) fn write(all: &Outcome, tables: &PaperTables, out: &Path) -> Result<()> {
+/// Writes everything that the experiment came to; `example`: caption and JPEG of figure 5.
+pub(super) fn write(
+    cases: &[Case],
+    example: Option<(String, Vec<u8>)>,
+    tables: &PaperTables,
+    out: &Path,
+) -> Result<()> {
     write_text(&out.join("tables.md"), &tables.markdown())?;
-    write_csv(&out.join("table2.csv"), &tables.csv()?, TABLE2, None)?;
-    if !tables.segmentation.is_empty() {
-        write_csv(
-            &out.join("segmentation.csv"),
-            &tables.segmentation_csv()?,
-            SEGMENTATION,
-            None,
-        )?;
-    }
+    write_csv(&out.join("table2.csv"), &tables.details, TABLE_2, None)?;
     let folder = out.join("figures");
     fs::create_dir_all(&folder).map_err(Error::io("making a folder", &folder))?;
     let mut page = Page::new("The paper's experiment");
@@ -38,97 +31,23 @@ pub(super) fn write(all: &Outcome, tables: &PaperTables, out: &Path) -> Result<(
          of the second are then moved by a known field, and everything is measured as between two epochs. In-plane figures are \
          per axis, as the paper's.",
     );
-    for origin in &all.origins {
-        page.note(&format!(
-            "{}: in all tables and figures the stones are {}.",
-            origin.survey, origin.words
-        ));
-    }
     page.heading("Table 1: parameters")
-        .html(&table(&PARAMETER_HEAD, &tables.parameters, None));
+        .html(&tables.parameters.html(None));
     page.heading("Table 2: RMSE of detected and applied motions")
-        .html(&table(&RMSE_HEAD, &tables.rmse, None));
+        .html(&tables.rmse.html(None));
     page.note(
         "In-plane: the translation of 2 cm along and 5 cm up. Out-of-plane: the bulge, over all stones of the wall, still ones \
          too; the rows \"inside it\" below count only the place that moves. The zero predictor always answers \"did not move\".",
     );
-    page.html(&table(PaperTables::detail_head(), &tables.detail_rows(), None));
-    if !tables.segmentation.is_empty() {
-        page.heading("Segmentation: stones held out of the training")
-            .html(&table(&SEGMENTATION_HEAD, &tables.segmentation_rows(), None));
-        page.note(
-            "A tenth of each labelled photo, in blocks, is held out of the training. All detectors but the paper's network are \
-             measured on the stones of these blocks alone; they are given whole photos, without relief. A detected stone is \
-             correct if its IoU with a true one is at least 0.5; mean IoU is the mean over the correct stones.",
-        );
+    page.html(&TextTable::of(&tables.details).html(None));
+    page.heading("Figures");
+    if let Some((caption, jpeg)) = example {
+        page.figure(&caption, &jpeg_element(&jpeg, &caption));
     }
-    if let Some(example) = &all.example {
-        let caption = format!(
-            "Figure 5: stones in {} ({} instances), {}",
-            example.photo, example.instances, example.origin
-        );
-        page.heading("Figures")
-            .figure(&caption, &jpeg_element(&example.jpeg, &caption));
-    }
-    let mut draw = |name: &str, caption: &str, plot: &Plot| -> Result<()> {
+    for (name, caption, plot) in cases.iter().flat_map(figures) {
         let svg = plot.svg();
         write_text(&folder.join(format!("{name}.svg")), &svg)?;
-        page.figure(caption, &svg);
-        Ok(())
-    };
-    for case in &all.cases {
-        let key = file_name(&format!("{}-{}", case.survey, case.method.folder()));
-        let key = key.to_string_lossy();
-        let who = format!("{}, {}", case.survey, case.method.name());
-        if case.motion.region.is_none() {
-            let title = format!("{who}: displacement of every stone, grey without a match (mm)");
-            draw(
-                &format!("figure_6-{key}"),
-                "Figure 6: translation",
-                &figures::stone_map(case, &title),
-            )?;
-            let [stones, m3c2] = figures::translation_scatter(case);
-            draw(
-                &format!("figure_7a-{key}"),
-                &format!("Figure 7: translation, {who}"),
-                &stones,
-            )?;
-            if case.method == Method::Ours {
-                draw(
-                    &format!("figure_7b-{key}"),
-                    &format!("Figure 7: translation, {who}"),
-                    &m3c2,
-                )?;
-            }
-            continue;
-        }
-        let title = format!("{who}: displacement of every stone, grey without a match (mm)");
-        draw(
-            &format!("figure_8-{key}"),
-            "Figure 8: bulge",
-            &figures::stone_map(case, &title),
-        )?;
-        if let Some([stones, m3c2]) = figures::bulge_maps(case) {
-            draw(
-                &format!("figure_9a-{key}"),
-                &format!("Figure 9: bulge, {who}"),
-                &stones,
-            )?;
-            if case.method == Method::Ours {
-                draw(
-                    &format!("figure_9b-{key}"),
-                    &format!("Figure 9: bulge, {who}"),
-                    &m3c2,
-                )?;
-            }
-        }
-        if let Some(profile) = figures::bulge_profile(case) {
-            draw(
-                &format!("figure_9c-{key}"),
-                &format!("Figure 9: profile, {who}"),
-                &profile,
-            )?;
-        }
+        page.figure(&caption, &svg);
     }
     write_text(&out.join("index.html"), &page.finish())
 }
