@@ -34,13 +34,13 @@ pub fn tune(args: &TuneArgs, force: bool, printer: &Printer) -> Result<Outcome> 
     };
     let point = &tuned.points[best];
 
-    if let Some(errors) = point.errors {
+    if let Some(rmse_m) = point.rmse_m() {
         printer.log(&format!(
             "{} combinations; the recommended one measures {:.0} of {:.0} stones with an RMSE of {:.2} mm (3D)",
             tuned.points.len(),
             point.measured,
             point.stones,
-            1e3 * errors.rmse_m
+            1e3 * rmse_m
         ));
     }
 

@@ -26,4 +26,4 @@ pub use survey_plan::{
     PlanDesign, PlannedDrone, PlannedInstrument, PlannedPhotos, PlannedRegistration, PlannedStation,
     PlannedSurvey, PlannedTargets, SurveyPlan, Weakest, design_plan,
 };
-pub use tune::{Dimension, DimensionError, TuneOptions, Tuned, TunedPoint, default_grid, tune};
+pub use tune::{Dimension, TuneOptions, Tuned, TunedPoint, default_grid, tune};

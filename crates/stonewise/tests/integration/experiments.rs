@@ -93,13 +93,13 @@ fn a_grid_finds_what_single_runs_find_and_resumes() {
         .unwrap();
     let (last, borders_kept) = (&tuned.points[3], &tuned.points[2]);
     let norm = score.errors.norm_3d.as_ref().unwrap();
-    assert!((last.errors.unwrap().rmse_m / norm.rmse_m - 1.0).abs() < 1e-9);
+    assert!((last.rmse_m().unwrap() / norm.rmse_m - 1.0).abs() < 1e-9);
     assert_eq!(last.measured, score.estimated as f64);
     assert!(last.measured >= 10.0 && norm.rmse_m < 0.003, "{last:?}");
     // Other points take part, so the errors are others.
     assert_ne!(
-        borders_kept.errors.unwrap().rmse_m,
-        last.errors.unwrap().rmse_m,
+        borders_kept.rmse_m().unwrap(),
+        last.rmse_m().unwrap(),
         "{borders_kept:?}"
     );
 

@@ -12,36 +12,23 @@ pub struct Dimension {
     pub values: Vec<toml::Value>,
 }
 
-/// Why a dimension cannot be read.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{text:?} is no dimension of a grid: {reason}")]
-pub struct DimensionError {
-    text: String,
-    reason: &'static str,
-}
-
 /// More values than this are a slip of the pen.
 const MOST_VALUES: f64 = 1000.0;
 
 impl FromStr for Dimension {
-    type Err = DimensionError;
+    type Err = String;
 
     /// Reads `key=a,b,c` or `key=from..to..step`; values that are no numbers or truth values are words.
-    fn from_str(text: &str) -> Result<Self, DimensionError> {
-        let fail = |reason| DimensionError {
-            text: text.to_owned(),
-            reason,
-        };
+    fn from_str(text: &str) -> Result<Self, String> {
         let (key, values) = text
             .split_once('=')
-            .ok_or_else(|| fail("write key=a,b,c or key=from..to..step"))?;
-        let values = if values.contains("..") {
-            range(values).ok_or_else(|| fail("a range is from..to..step, three numbers, step above 0"))?
-        } else {
-            values.split(',').map(|v| scalar(v.trim())).collect()
+            .ok_or("write key=a,b,c or key=from..to..step")?;
+        let values: Vec<toml::Value> = match values.contains("..") {
+            true => range(values).ok_or("a range is from..to..step, three numbers, step above 0")?,
+            false => values.split(',').map(|v| scalar(v.trim())).collect(),
         };
         if values.iter().any(|v| v.as_str() == Some("")) {
-            return Err(fail("a value is empty"));
+            return Err("a value is empty".to_owned());
         }
         Ok(Self {
             key: key.trim().to_owned(),
@@ -65,16 +52,10 @@ fn range(text: &str) -> Option<Vec<toml::Value>> {
         return None;
     };
     let count = ((to - from) / step + 1e-9).floor();
-    if step <= 0.0 || !(0.0..MOST_VALUES).contains(&count) {
-        return None;
-    }
+    let is_sensible = step > 0.0 && (0.0..MOST_VALUES).contains(&count);
     // Rounded, so that 0.2 + 0.1 reads 0.3.
-    let value = |i: usize| ((from + i as f64 * step) * 1e9).round() / 1e9;
-    Some(
-        (0..=count as usize)
-            .map(|i| toml::Value::Float(value(i)))
-            .collect(),
-    )
+    let value = |i: usize| toml::Value::Float(((from + i as f64 * step) * 1e9).round() / 1e9);
+    is_sensible.then(|| (0..=count as usize).map(value).collect())
 }
 
 /// The grid that is tried where none is given: the paper's three parameters, with values on both sides of its
@@ -101,16 +82,13 @@ pub fn default_grid(settings: &Settings) -> Vec<Dimension> {
 /// Every combination of values, the last dimension changing fastest.
 pub(super) fn points(grid: &[Dimension]) -> Vec<Vec<toml::Value>> {
     grid.iter().fold(vec![Vec::new()], |points, dimension| {
-        points
-            .iter()
-            .flat_map(|point| {
-                dimension.values.iter().map(move |value| {
-                    let mut longer = point.clone();
-                    longer.push(value.clone());
-                    longer
-                })
-            })
-            .collect()
+        let longer = |point: &Vec<toml::Value>| {
+            let values = dimension.values.iter();
+            values
+                .map(|v| [point.as_slice(), &[v.clone()]].concat())
+                .collect::<Vec<_>>()
+        };
+        points.iter().flat_map(longer).collect()
     })
 }
 

@@ -1,12 +1,9 @@
 //! The exhaustive grid by which the paper chose its parameters.
 
-mod front;
 mod grid;
 mod page;
-mod tuned;
 
-pub use grid::{Dimension, DimensionError, default_grid};
-pub use tuned::{PointErrors, TuneOptions, Tuned, TunedPoint};
+pub use grid::{Dimension, default_grid};
 
 use crate::error::{Error, Result};
 use crate::experiment::halves::halves_of;
@@ -14,16 +11,81 @@ use crate::experiment::inner_work::InnerWork;
 use crate::experiment::known_motion::paper_motions;
 use crate::experiment::settings_with::{count_changes, project_lines, settings_with};
 use crate::files::write_text;
+use crate::part::Part;
 use crate::pipeline::{Context, Until, first_stones, run_in};
 use crate::project::Project;
 use crate::storage::store::{Keeps, StepStore};
-use front::{Worth, front, recommended};
 use std::path::Path;
 use std::sync::Arc;
 use stonewise_core::epoch::EpochId;
-use stonewise_core::evaluate::MotionScore;
+use stonewise_core::evaluate::{Directions, ErrorStatistics, MotionScore};
 use stonewise_core::parallel::in_parallel;
 use stonewise_core::progress::Progress;
+
+/// A share of the most stones that the recommended combination must measure at least: 0.95, because the paper chooses by
+/// the lowest RMSE and by the most matches at once, and a gain in accuracy is not worth more than a twentieth of the stones.
+const ENOUGH: f64 = 0.95;
+
+/// What is tuned, on what.
+#[derive(Clone, Debug, Default)]
+pub struct TuneOptions {
+    /// Parameters and their values; [`default_grid`] where empty.
+    pub grid: Vec<Dimension>,
+    /// Points that take part; all where absent.
+    pub part: Option<Part>,
+    /// Which points and photos go to which half, where the project prescribes no motion.
+    pub seed: u64,
+}
+
+/// One combination and what it came to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TunedPoint {
+    /// Values, in the order of the grid's dimensions.
+    pub values: Vec<toml::Value>,
+    /// Stones of the first epoch.
+    pub stones: f64,
+    /// Stones of the first epoch that were matched; mean over the motions.
+    pub matched: f64,
+    /// Stones of the first epoch that were measured; mean over the motions.
+    pub measured: f64,
+    /// Errors of the measured stones, for each motion that could be measured.
+    pub scores: Vec<MotionScore>,
+    /// Why the stones could not be measured.
+    pub failure: Option<String>,
+}
+
+impl TunedPoint {
+    /// RMSE of the norm of the 3D error over all motions, metres: what is made small.
+    pub fn rmse_m(&self) -> Option<f64> {
+        let square = self.mean(|d| d.norm_3d.as_ref(), |e| e.rmse_m.powi(2));
+        square.map(f64::sqrt)
+    }
+
+    /// A figure of the errors in a direction: the mean over the motions, weighted by their stones; `None` where a motion
+    /// could not be measured.
+    fn mean(
+        &self,
+        direction: fn(&Directions) -> Option<&ErrorStatistics>,
+        of: fn(&ErrorStatistics) -> f64,
+    ) -> Option<f64> {
+        let all = || self.scores.iter().filter_map(|s| direction(&s.errors));
+        let count: usize = all().map(|e| e.count).sum();
+        let sum: f64 = all().map(|e| of(e) * e.count as f64).sum();
+        (count > 0 && self.failure.is_none()).then(|| sum / count as f64)
+    }
+}
+
+/// A finished grid.
+#[derive(Clone, Debug)]
+pub struct Tuned {
+    /// All combinations, the last dimension changing fastest.
+    pub points: Vec<TunedPoint>,
+    /// The one with the lowest error among those with at least 95 % of the most stones; of equal ones the one that changes
+    /// the fewest parameters.
+    pub recommended: Option<usize>,
+    /// Lines for the project file that set the recommended values.
+    pub lines: String,
+}
 
 /// Tries every combination of parameters and writes `tune.csv`, `index.html`, `tune.svg` and
 /// `recommended.toml` into `out`.
@@ -31,11 +93,11 @@ use stonewise_core::progress::Progress;
 /// Truth is the project's known motion. A project without one is split: epoch 1 into halves
 /// ([`crate::split()`]), the points of the second moved once by the paper's translation and once by its
 /// bulge; errors are pooled over both, because the translation alone would favour any amount of smoothing.
-/// Points of the grid run in parallel; steps are kept in `out/work`, one version for each set of parameters,
-/// so that points share what they have in common and an interrupted grid goes on.
+/// Combinations run in parallel; steps are kept in `out/work`, one version for each set of parameters,
+/// so that combinations share what they have in common and an interrupted grid goes on.
 ///
 /// # Errors
-/// A parameter or value that cannot be, no stones, files. A grid point that cannot be measured is a row that
+/// A parameter or value that cannot be, no stones, files. A combination that cannot be measured is a row that
 /// says why.
 pub fn tune(project: &Project, options: &TuneOptions, out: &Path, progress: &dyn Progress) -> Result<Tuned> {
     let grid = match options.grid.as_slice() {
@@ -43,9 +105,12 @@ pub fn tune(project: &Project, options: &TuneOptions, out: &Path, progress: &dyn
         given => given.to_vec(),
     };
     let values = grid::points(&grid);
-    for point in &values {
-        settings_with(&project.settings, &changes(&grid, point))?;
-    }
+    let changes = { values.iter() }
+        .map(|point| {
+            settings_with(&project.settings, &changes(&grid, point))?;
+            count_changes(&project.settings, &changes(&grid, point))
+        })
+        .collect::<Result<Vec<usize>>>()?;
     let store = Arc::new(StepStore::new(&out.join("work"), Keeps::Every)?);
     let whole = Project {
         part: options.part.clone(),
@@ -60,27 +125,15 @@ pub fn tune(project: &Project, options: &TuneOptions, out: &Path, progress: &dyn
         progress.advance(1);
         Ok::<_, Error>(point)
     })?;
-    let ranked: Vec<Worth> = points
-        .iter()
-        .map(|p| {
-            let worth = Worth {
-                stones: p.measured,
-                rmse_m: p.errors.map(|e| e.rmse_m),
-                changes: count_changes(&project.settings, &changes(&grid, &p.values))?,
-            };
-            Ok(worth)
-        })
-        .collect::<Result<_>>()?;
-
-    let best = recommended(&ranked);
+    let recommended = recommended(&points, &changes);
     let tuned = Tuned {
-        front: front(&ranked),
-        recommended: best,
-        lines: best.map_or_else(String::new, |i| project_lines(&changes(&grid, &points[i].values))),
-        grid,
+        recommended,
+        lines: recommended.map_or_else(String::new, |i| {
+            project_lines(&self::changes(&grid, &points[i].values))
+        }),
         points,
     };
-    page::write(&tuned, &whole, &cases, out)?;
+    page::write(&tuned, &grid, &project.name, &cases, out)?;
     write_text(&out.join("recommended.toml"), &tuned.lines)?;
     Ok(tuned)
 }
@@ -89,7 +142,7 @@ fn changes<'a>(grid: &'a [Dimension], values: &'a [toml::Value]) -> Vec<(&'a str
     grid.iter().map(|d| d.key.as_str()).zip(values).collect()
 }
 
-/// Projects with a known motion in which every grid point is tried, with their names.
+/// Projects with a known motion in which every combination is tried, with their names.
 fn cases(
     project: &Project,
     seed: u64,
@@ -123,19 +176,12 @@ fn measure(
 ) -> Result<TunedPoint> {
     let mut point = TunedPoint {
         values: values.to_vec(),
-        stones: 0.0,
-        matched: 0.0,
-        measured: 0.0,
-        errors: None,
-        failure: None,
+        ..TunedPoint::default()
     };
     let name: Vec<String> = values.iter().map(|v| v.to_string().replace('"', "")).collect();
-    let mut scores = Vec::new();
-
     for (number, (_, case)) in (1..).zip(cases) {
-        let settings = settings_with(&case.settings, &changes(grid, values))?;
         let project = Project {
-            settings,
+            settings: settings_with(&case.settings, &changes(grid, values))?,
             ..case.clone()
         };
         let folder = out.join(name.join("_")).join(number.to_string());
@@ -153,34 +199,56 @@ fn measure(
         point.stones += share * pair.rows.len() as f64;
         point.matched += share * pair.rows.iter().filter(|r| r.matched_id.is_some()).count() as f64;
         point.measured += share * pair.rows.iter().filter(|r| r.motion.is_some()).count() as f64;
-        scores.extend(pair.evaluation.and_then(|e| e.stones));
-    }
-
-    if point.failure.is_none() {
-        point.errors = PointErrors::of(&scores);
+        point.scores.extend(pair.evaluation.and_then(|e| e.stones));
     }
     Ok(point)
 }
 
-impl PointErrors {
-    /// Errors of several motions together, each weighted by its number of stones.
-    fn of(scores: &[MotionScore]) -> Option<Self> {
-        type Pick = fn(&MotionScore) -> Option<&stonewise_core::evaluate::ErrorStatistics>;
-        let pooled = |pick: Pick| {
-            let (squares, count) = scores.iter().filter_map(pick).fold((0.0, 0.0), |(s, n), e| {
-                (s + e.rmse_m.powi(2) * e.count as f64, n + e.count as f64)
-            });
-            (count > 0.0).then(|| (squares / count).sqrt())
-        };
-        let norms: Vec<_> = scores.iter().filter_map(|s| s.errors.norm_3d.as_ref()).collect();
-        let count: usize = norms.iter().map(|n| n.count).sum();
-        let wrong: f64 = norms.iter().map(|n| n.outlier_rate * n.count as f64).sum();
-        Some(Self {
-            rmse_m: pooled(|s| s.errors.norm_3d.as_ref())?,
-            in_plane_m: pooled(|s| s.errors.in_plane_per_axis.as_ref())?,
-            out_of_plane_m: pooled(|s| s.errors.out_of_plane.as_ref())?,
-            p95_m: norms.iter().map(|n| n.p95_m).fold(0.0, f64::max),
-            outlier_rate: wrong / count as f64,
-        })
+/// The combination with the lowest RMSE among those that measure nearly the most stones; `changes`: how many parameters
+/// each of them changes.
+fn recommended(points: &[TunedPoint], changes: &[usize]) -> Option<usize> {
+    let measured = || (0..points.len()).filter_map(|i| Some((i, points[i].rmse_m()?)));
+    let most = measured().map(|(i, _)| points[i].measured).fold(0.0, f64::max);
+    let enough = measured().filter(|(i, _)| points[*i].measured >= ENOUGH * most);
+    let best = enough.min_by(|(i, a), (j, b)| {
+        let more_stones = points[*j].measured.total_cmp(&points[*i].measured);
+        a.total_cmp(b)
+            .then(more_stones)
+            .then(changes[*i].cmp(&changes[*j]))
+    });
+    Some(best?.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stonewise_core::evaluate::{EvaluationParams, score_motions};
+
+    fn point(measured: f64, rmse_m: Option<f64>) -> TunedPoint {
+        // Two errors whose root mean square is that.
+        let errors = rmse_m.and_then(|e| ErrorStatistics::of(&[e, -e], &[0.0; 2], 1.0));
+        let mut score = score_motions(&[], 0, &EvaluationParams::default());
+        score.errors.norm_3d = errors;
+        TunedPoint {
+            measured,
+            scores: vec![score],
+            ..TunedPoint::default()
+        }
+    }
+
+    #[test]
+    fn the_recommended_one_measures_nearly_all_stones_and_changes_least() {
+        let stones = [
+            (100.0, 5.0),
+            (98.0, 2.0),
+            (98.0, 2.0),
+            (98.0, 3.0),
+            (60.0, 1.0),
+            (50.0, 1.0),
+        ];
+        let mut points: Vec<TunedPoint> = stones.map(|(n, rmse)| point(n, Some(rmse))).into();
+        points.push(point(0.0, None));
+        assert_eq!(recommended(&points, &[0, 2, 1, 0, 0, 0, 0]), Some(2));
+        assert_eq!(recommended(&points[6..], &[0]), None);
     }
 }
