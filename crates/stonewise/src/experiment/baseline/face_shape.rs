@@ -5,10 +5,9 @@ use serde::Serialize;
 use stonewise_core::geometry::FaceFrame;
 use stonewise_core::statistics::median;
 
-/// A stone farther from the face than this many robust standard deviations takes no part in the fit.
-const OUTLIER: f64 = 3.0;
-/// Median absolute deviation to standard deviation of a normal distribution.
-const NORMAL: f64 = 1.4826;
+/// A stone farther from the face than this many median distances takes no part in the fit: three standard deviations of
+/// a normal distribution.
+const OUTLIER: f64 = 3.0 * 1.4826;
 /// How often stones that stand out are left out anew.
 const ROUNDS: usize = 3;
 
@@ -16,21 +15,15 @@ const ROUNDS: usize = 3;
 ///
 /// With x along the chord, y out of the wall and z up, all from the middle of the stones, the face is
 /// y = c + m x + b z + k / 2 (x^2 + y^2): a circle in plan of curvature k, or a straight line where k is zero, that leans by b.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FaceShape {
+    #[serde(skip)]
     middle: Point3<f64>,
+    #[serde(skip)]
     frame: FaceFrame,
     /// c, m, b, k.
+    #[serde(skip)]
     coefficients: Vector4<f64>,
-    /// Standard deviation of k.
-    curvature_sd: f64,
-    /// Standard deviation of b.
-    lean_sd: f64,
-}
-
-/// The numbers of a [`FaceShape`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct ShapeFigures {
     /// How far the face leans back for each metre of height.
     pub batter: f64,
     /// Its standard deviation, as the scatter of the stones about the face gives it.
@@ -44,29 +37,25 @@ impl FaceShape {
     /// The face through the middles of stones of a wall whose outside is `out`; `None` for fewer than eight stones, or
     /// stones in one line.
     pub fn fit(middles: &[Point3<f64>], out: &Vector3<f64>) -> Option<Self> {
-        let level = Vector3::new(out.x, out.y, 0.0);
-        let frame = FaceFrame::from_normal(&level.try_normalize(1e-9)?);
+        let level = Vector3::new(out.x, out.y, 0.0).try_normalize(1e-9)?;
         let sum: Vector3<f64> = middles.iter().map(|p| p.coords).sum();
         let mut shape = Self {
             middle: Point3::from(sum / middles.len().max(1) as f64),
-            frame,
+            frame: FaceFrame::from_normal(&level),
             coefficients: Vector4::zeros(),
-            curvature_sd: f64::INFINITY,
-            lean_sd: f64::INFINITY,
+            batter: 0.0,
+            batter_sd: 0.0,
+            radius_m: None,
         };
-        let mut used: Vec<Point3<f64>> = middles.to_vec();
-
+        let mut used = middles.to_vec();
         for _ in 0..ROUNDS {
             shape.refit(&used)?;
-            let distances: Vec<f64> = middles.iter().map(|p| shape.out_m(p)).collect();
-            let spread = NORMAL * median(&mut distances.iter().map(|d| d.abs()).collect::<Vec<_>>())?;
-            let near = distances.iter().map(|d| d.abs() <= (OUTLIER * spread).max(1e-6));
-            used = { middles.iter().zip(near) }
-                .filter(|(_, near)| *near)
-                .map(|(p, _)| *p)
+            let distance = |p: &Point3<f64>| shape.out_m(p).abs();
+            let most = OUTLIER * median(&mut middles.iter().map(distance).collect::<Vec<_>>())?;
+            used = { middles.iter().filter(|p| distance(p) <= most.max(1e-6)) }
+                .copied()
                 .collect();
         }
-
         Some(shape)
     }
 
@@ -82,9 +71,13 @@ impl FaceShape {
         let squares: f64 = { rows.iter() }
             .map(|(row, y)| (y - (row * self.coefficients)[0]).powi(2))
             .sum();
-        let inverse = factor.inverse();
-        let variance = squares / (points.len() - 4) as f64;
-        [self.lean_sd, self.curvature_sd] = [2, 3].map(|i| (variance * inverse[(i, i)]).max(0.0).sqrt());
+        let covariance = factor.inverse() * squares / (points.len() - 4) as f64;
+        let [_, m, b, k] = self.coefficients.into();
+        // Across the chord at its middle, where the line in plan has the slope m.
+        let across = (1.0 + m * m).sqrt();
+        self.batter = -b / across;
+        self.batter_sd = covariance[(2, 2)].max(0.0).sqrt();
+        self.radius_m = (k.abs() > 3.0 * covariance[(3, 3)].max(0.0).sqrt()).then(|| across / k);
         Some(())
     }
 
@@ -101,19 +94,6 @@ impl FaceShape {
         let [_, m, b, k] = self.coefficients.into();
         let slope = Vector3::new(m + k * row[1], k * y - 1.0, b);
         (y - (row * self.coefficients)[0]) / slope.norm()
-    }
-
-    /// Batter and radius.
-    pub fn figures(&self) -> ShapeFigures {
-        let [_, m, b, k] = self.coefficients.into();
-        let is_curved = k.abs() > 3.0 * self.curvature_sd;
-        // Across the chord at its middle, where the line in plan has the slope m.
-        let across = (1.0 + m * m).sqrt();
-        ShapeFigures {
-            batter: -b / across,
-            batter_sd: self.lean_sd,
-            radius_m: is_curved.then(|| across / k),
-        }
     }
 }
 
@@ -137,7 +117,7 @@ mod tests {
     fn a_hollow_arch_shows_its_radius_batter_and_a_bulge() {
         let mut points = face(40.0, 0.2);
         let out = -Vector3::y();
-        let ground = FaceShape::fit(&points, &out).unwrap().figures();
+        let ground = FaceShape::fit(&points, &out).unwrap();
         assert!((ground.batter - 0.2).abs() < 0.01, "{ground:?}");
         assert!((ground.radius_m.unwrap() / 40.0 - 1.0).abs() < 0.03, "{ground:?}");
         let toward = (Point3::new(5e5, 5e6, points[1050].z) - points[1050]).normalize();
@@ -154,7 +134,7 @@ mod tests {
                 Point3::new(a, 0.1 * z + 0.01 * (f64::from(i) * 2.4).sin(), z)
             })
             .collect();
-        let figures = FaceShape::fit(&plane, &-Vector3::y()).unwrap().figures();
+        let figures = FaceShape::fit(&plane, &-Vector3::y()).unwrap();
         assert!((figures.batter - 0.1).abs() < 0.002, "{figures:?}");
         assert_eq!(figures.radius_m, None);
         let line: Vec<Point3<f64>> = (0..20).map(|i| Point3::new(f64::from(i), 0.0, 0.0)).collect();

@@ -1,15 +1,15 @@
-//! What the first survey shows of a wall: its stones, its joints, the shape of its face, and where nothing is covered.
+//! What the first survey shows of a wall: its stones, its joints, the shape of its face, and how much of it is covered.
 
+mod cover;
 mod face_shape;
-mod gaps;
 
 use crate::error::Result;
 use crate::pipeline::{Context, Run, Until};
 use crate::project::Project;
-use crate::results::{Joint, ResultSet, StoneRow, joints};
+use crate::results::{ResultSet, StoneRow, joints};
 use crate::storage::store::StepStore;
-use face_shape::{FaceShape, ShapeFigures};
-use gaps::{Cover, Gap};
+use cover::{Cover, Coverage};
+use face_shape::FaceShape;
 use nalgebra::{Point2, Point3, Vector3};
 use serde::Serialize;
 use std::path::Path;
@@ -21,8 +21,6 @@ use stonewise_core::statistics::{median, quantile};
 
 /// A point of the cloud belongs to the face if it lies this close to its smooth shape, metres.
 const FACE_M: f64 = 0.3;
-/// Most gaps that are listed.
-const LISTED: usize = 20;
 
 /// What the first survey shows of a wall.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -39,16 +37,13 @@ pub struct Baseline {
     pub joint_mm: Option<[f64; 3]>,
     /// Length along the wall and height up its face, from the outermost stones, metres.
     pub extent_m: [f64; 2],
-    /// Area of the face between the outermost stones, m2.
-    pub face_m2: f64,
     /// Batter and radius in plan; absent where too few stones show them.
-    pub shape: Option<ShapeFigures>,
+    pub shape: Option<FaceShape>,
     /// Distance of a stone's middle from that smooth face, millimetres: root mean square.
     pub relief_mm: Option<f64>,
-    /// Share of the face that stones and the joints between them cover.
-    pub covered: f64,
-    /// The largest parts of the face without stones, at most 20.
-    pub gaps: Vec<Gap>,
+    /// How much of the face is covered.
+    #[serde(flatten)]
+    pub coverage: Coverage,
 }
 
 /// One stone of the inventory.
@@ -58,7 +53,7 @@ pub struct InventoryStone {
     /// Width along the wall and height up the face, metres; absent where the stone has no outline.
     pub size_m: Option<[f64; 2]>,
     /// Outline on the unrolled wall, metres.
-    pub ring: Vec<[f64; 2]>,
+    pub ring: Vec<Point2<f64>>,
     /// How far its middle lies in front of the smooth face, metres.
     pub out_m: Option<f64>,
     /// Number of neighbours across a joint.
@@ -84,8 +79,7 @@ pub fn baseline(
     };
     let context = Context::with_store(&alone, out, Arc::clone(store), progress)?;
     let run = Run::new(&context, Until::Labelled);
-    let labelled = run.labelled(EpochId::REFERENCE)?;
-    let outlined = run.outlined()?;
+    let (labelled, outlined) = (run.labelled(EpochId::REFERENCE)?, run.outlined()?);
     let rows: Vec<StoneRow> = { labelled.stones.iter() }
         .map(|stone| {
             let place = outlined.facade.place(&stone.centroid);
@@ -108,11 +102,34 @@ pub fn baseline(
     let out_of_wall: Vector3<f64> = labelled.stones.iter().map(|s| s.normal).sum();
     let shape = FaceShape::fit(&middles, &out_of_wall);
 
-    let has_outline = |s: &&StoneRow| shown.outlines.contains_key(&s.stone_id);
-    let rings = { shown.stones.iter() }
-        .filter(has_outline)
-        .map(|s| shown.unrolled(s))
-        .collect::<Vec<_>>();
+    let joints = joints(&shown);
+    // Lengths and widths of the joints of each stone.
+    let mut around = vec![Vec::new(); shown.stones.len()];
+    for joint in &joints {
+        for &stone in &joint.stones {
+            around[stone].push(((joint.line[1] - joint.line[0]).norm(), joint.width_m));
+        }
+    }
+    let stones: Vec<InventoryStone> = { shown.stones.iter().zip(around) }
+        .map(|(row, around)| {
+            let lengths: f64 = around.iter().map(|(length, _)| length).sum();
+            let areas: f64 = around.iter().map(|(length, width)| length * width).sum();
+            let has_outline = shown.outlines.contains_key(&row.stone_id);
+            let ring = shown.unrolled(row);
+            InventoryStone {
+                size_m: extent(&ring).filter(|_| has_outline),
+                out_m: shape.as_ref().map(|s| s.out_m(&row.centroid)),
+                neighbours: around.len() as u32,
+                joint_m: (lengths > 0.0).then(|| areas / lengths),
+                ring,
+                row: row.clone(),
+            }
+        })
+        .collect();
+    let rings: Vec<Vec<Point2<f64>>> = { stones.iter() }
+        .filter(|s| s.size_m.is_some())
+        .map(|s| s.ring.clone())
+        .collect();
     let mut cover = Cover::new(&rings);
     if let Some(cover) = &mut cover {
         let tiles = &labelled.ingested.tiles;
@@ -127,64 +144,24 @@ pub fn baseline(
         }
     }
 
-    let joints = joints(&shown);
-    let stones = inventory(&shown, shape.as_ref(), &joints);
-    Ok((summary(&stones, &rings, shape, &joints, cover.as_ref()), stones))
-}
-
-fn inventory(shown: &ResultSet, shape: Option<&FaceShape>, joints: &[Joint]) -> Vec<InventoryStone> {
-    // Joints, their length and their length times their width.
-    let mut sums = vec![(0, 0.0, 0.0); shown.stones.len()];
-    for joint in joints {
-        let length = (joint.line[1] - joint.line[0]).norm();
-        for &stone in &joint.stones {
-            let (count, lengths, areas) = &mut sums[stone];
-            *count += 1;
-            *lengths += length;
-            *areas += length * joint.width_m;
-        }
-    }
-    { shown.stones.iter().zip(sums) }
-        .map(|(row, (neighbours, lengths, areas))| InventoryStone {
-            size_m: { shown.outlines.get(&row.stone_id) }.and_then(|_| extent(&shown.unrolled(row))),
-            out_m: shape.map(|s| s.out_m(&row.centroid)),
-            neighbours,
-            joint_m: (lengths > 0.0).then(|| areas / lengths),
-            ring: shown.unrolled(row).iter().map(|p| [p.x, p.y]).collect(),
-            row: row.clone(),
-        })
-        .collect()
-}
-
-fn summary(
-    stones: &[InventoryStone],
-    rings: &[Vec<Point2<f64>>],
-    shape: Option<FaceShape>,
-    joints: &[Joint],
-    cover: Option<&Cover>,
-) -> Baseline {
-    let [widths, heights] = [0, 1].map(|axis| {
-        let sizes = stones.iter().filter_map(|s| s.size_m).map(|s| s[axis]);
-        median(&mut sizes.collect::<Vec<_>>())
-    });
+    let side = |axis: usize| {
+        let sizes = stones.iter().filter_map(|s| s.size_m);
+        median(&mut sizes.map(|size| size[axis]).collect::<Vec<_>>())
+    };
     let squares: Vec<f64> = stones.iter().filter_map(|s| s.out_m).map(|d| d * d).collect();
-    let (face_m2, covered, mut gaps) = cover.map_or((0.0, 0.0, Vec::new()), Cover::gaps);
-    gaps.truncate(LISTED);
-    let outer: Vec<Point2<f64>> = rings.iter().flatten().copied().collect();
-    Baseline {
+    let baseline = Baseline {
         stones: stones.len(),
         area_m2: spread(stones.iter().map(|s| s.row.area_m2)),
-        size_m: widths.zip(heights).map(|(w, h)| [w, h]),
+        size_m: side(0).zip(side(1)).map(|(w, h)| [w, h]),
         joints: joints.len(),
         joint_mm: spread(joints.iter().map(|j| 1e3 * j.width_m)),
-        extent_m: extent(&outer).unwrap_or_default(),
-        face_m2,
-        shape: shape.map(|s| s.figures()),
+        extent_m: extent(&rings.concat()).unwrap_or_default(),
+        shape,
         relief_mm: (!squares.is_empty())
             .then(|| 1e3 * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()),
-        covered,
-        gaps,
-    }
+        coverage: cover.as_ref().map(Cover::coverage).unwrap_or_default(),
+    };
+    Ok((baseline, stones))
 }
 
 /// Quantiles of 5, 50 and 95 %.

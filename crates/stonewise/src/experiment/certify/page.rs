@@ -2,7 +2,8 @@
 
 use super::certificate::{Certificate, Figure};
 use crate::error::Result;
-use crate::figure::{Page, table};
+use crate::experiment::tables::TextTable;
+use crate::figure::Page;
 use crate::files::write_text;
 use std::path::Path;
 
@@ -42,19 +43,15 @@ pub(super) fn write(certificate: &Certificate, path: &Path) -> Result<()> {
             continue;
         }
         page.heading(heading).note(text);
-        let rows: Vec<Vec<String>> = figures.into_iter().map(row).collect();
-        page.html(&table(
-            &["figure", "value", "allowed", "holds", "note"],
-            &rows,
-            None,
-        ));
+        let head = ["figure", "value", "allowed", "holds", "note"];
+        page.html(&TextTable::new(head, figures.into_iter().map(row).collect()).html(None));
     }
     write_text(path, &page.finish())
 }
 
-fn row(figure: &Figure) -> Vec<String> {
+fn row(figure: &Figure) -> [String; 5] {
     let number = |v: f64| format!("{}", (v * 1e4).round() / 1e4);
-    vec![
+    [
         figure.name.clone(),
         figure.value.map_or("\u{2013}".to_owned(), number),
         match (figure.least, figure.most) {

@@ -3,7 +3,8 @@
 use super::expected::{Design, Foreseen};
 use crate::experiment::baseline::Baseline;
 use crate::experiment::predicted::in_table;
-use crate::figure::{Axis, GREY, Item, Page, Plot, Ramp, table};
+use crate::experiment::tables::TextTable;
+use crate::figure::{Axis, GREY, Item, Page, Plot, Ramp, number};
 use stonewise_core::registration::ZONE_EXTENTS_M;
 
 /// Width of the map, pixels.
@@ -18,167 +19,116 @@ pub(super) fn page(design: &Design, stones: &[Foreseen]) -> String {
          Registration: {}. Medians over these stones, millimetres, one standard deviation.",
         design.epoch, design.datum
     ));
-    let row = |name: String, values: [Option<f64>; 3]| {
-        std::iter::once(name)
-            .chain(values.map(in_table))
-            .collect::<Vec<_>>()
-    };
+    let sources = design.sources;
+    let more = format!(
+        "motion with {} instead of {sources} stations or strips",
+        sources + 1
+    );
     let rows = [
-        row("motion".to_owned(), design.sd_mm),
-        row("deformation".to_owned(), design.sd_deformation_mm),
-        row(
-            format!(
-                "motion with {} instead of {} stations or strips",
-                design.sources + 1,
-                design.sources
-            ),
-            design.sd_with_one_more_mm,
-        ),
-        row(
-            "motion without any error of registration".to_owned(),
+        ("motion", design.sd_mm),
+        ("deformation", design.sd_deformation_mm),
+        (&more, design.sd_with_one_more_mm),
+        (
+            "motion without any error of registration",
             design.sd_without_registration_mm,
         ),
     ];
-
-    page.html(&table(
-        &["standard deviation, mm", "along", "up", "out"],
-        &rows,
-        None,
-    ));
-    let limits = design.zones_mm.iter().zip(design.zones_in_face_mm);
-    let zones: Vec<Vec<String>> = { ZONE_EXTENTS_M.iter().zip(limits) }
-        .map(|(extent, (out, in_face))| vec![format!("{extent} m"), in_table(*out), in_table(in_face)])
-        .collect();
+    let rows = rows.map(|(name, values)| {
+        let [along, up, out] = values.map(in_table);
+        [name.to_owned(), along, up, out]
+    });
+    let deviations = TextTable::new(["standard deviation, mm", "along", "up", "out"], rows.into());
+    page.html(&deviations.html(None));
+    let zone = |i: usize| {
+        let [out, in_face] = [design.zones_mm[i], design.zones_in_face_mm[i]].map(in_table);
+        [format!("{} m", ZONE_EXTENTS_M[i]), out, in_face]
+    };
+    let zones = TextTable::new(
+        ["extent", "out of the wall, mm", "in the face, mm"],
+        [0, 1, 2].map(zone).into(),
+    );
     page.heading("Smallest motion of a zone that is found in 95 of 100 cases")
-        .html(&table(
-            &["extent", "out of the wall, mm", "in the face, mm"],
-            &zones,
-            None,
-        ));
-
-    page.heading("Stones").html(&map(design, stones));
-    show_wall(&mut page, &design.baseline);
+        .html(&zones.html(None));
+    page.heading("Stones").html(&map(stones));
+    page.heading("The wall at the first survey")
+        .html(&wall(&design.baseline).html(None));
     page.finish()
 }
 
-/// Every stone in the colour of its expected standard deviation, and the gaps. That of the deformation: what all stones
-/// share of the registration would hide the differences.
-fn map(design: &Design, stones: &[Foreseen]) -> String {
-    let corners = |axis: usize| {
-        stones
-            .iter()
-            .flat_map(move |s| s.stone.ring.iter().map(move |p| p[axis]))
-    };
+/// Every stone in the colour of its expected standard deviation. That of the deformation: what all stones share of the
+/// registration would hide the differences.
+fn map(stones: &[Foreseen]) -> String {
+    let corners = || stones.iter().flat_map(|s| &s.stone.ring);
     let out_mm = |s: &Foreseen| { s.expected.as_ref() }.map(|e| 1e3 * e.deformation[2].unwrap_or(e.sd[2]));
     let largest = { stones.iter().filter_map(out_mm) }.fold(0.0, f64::max);
     let ramp = Ramp {
         range: [0.0, if largest > 0.0 { largest } else { 1.0 }],
     };
     let mut map = Plot::map(
-        "standard deviation of the deformation out of the wall; grey: not measured; dashed: no stones",
-        Axis::around("along the wall (m)", corners(0), false),
-        Axis::around("up the face (m)", corners(1), false),
+        "standard deviation of the deformation out of the wall; grey: not measured",
+        Axis::around("along the wall (m)", corners().map(|p| p.x), false),
+        Axis::around("up the face (m)", corners().map(|p| p.y), false),
         MAP_PX,
         Some((ramp, "mm".to_owned())),
     );
     let area = |s: &Foreseen| {
         let colour = out_mm(s).map_or(GREY.to_owned(), |mm| ramp.colour(mm));
-        (s.stone.ring.clone(), colour)
+        (s.stone.ring.iter().map(|p| [p.x, p.y]).collect(), colour)
     };
     map.add(Item::Areas(stones.iter().map(area).collect()));
-    for gap in &design.baseline.gaps {
-        let corner = |i: f64, j: f64| {
-            [
-                gap.along_m + 0.5 * i * gap.width_m,
-                gap.up_m + 0.5 * j * gap.height_m,
-            ]
-        };
-        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)];
-        map.add(Item::Line {
-            points: corners.map(|(i, j)| corner(i, j)).into(),
-            colour: "#0072b2".to_owned(),
-            dashed: true,
-            marks: false,
-            name: String::new(),
-        });
-    }
     map.svg()
 }
 
-fn show_wall(page: &mut Page, wall: &Baseline) {
+fn wall(wall: &Baseline) -> TextTable {
     let range = |values: Option<[f64; 3]>, decimals: usize| {
-        values.map_or("\u{2013}".to_owned(), |[low, middle, high]| {
-            format!("{middle:.decimals$} ({low:.decimals$} to {high:.decimals$})")
-        })
+        let [low, middle, high] = values.unwrap_or([f64::NAN; 3]).map(|v| number(v, decimals));
+        format!("{middle} ({low} to {high})")
     };
+    let extent = |size: Option<[f64; 2]>, decimals: usize| {
+        let [width, height] = size.unwrap_or([f64::NAN; 2]).map(|v| number(v, decimals));
+        format!("{width} x {height} m")
+    };
+    let coverage = &wall.coverage;
     let mut rows = vec![
-        vec!["stones".to_owned(), wall.stones.to_string()],
-        vec![
-            "area of a stone's face, m\u{b2}: median (5 to 95 %)".to_owned(),
+        ("stones", wall.stones.to_string()),
+        (
+            "area of a stone's face, m\u{b2}: median (5 to 95 %)",
             range(wall.area_m2, 3),
-        ],
-    ];
-    if let Some([width, height]) = wall.size_m {
-        let size = format!("{width:.2} x {height:.2} m");
-        rows.push(vec!["median stone, width x height".to_owned(), size]);
-    }
-    rows.push(vec![
-        "joints, width in mm: median (5 to 95 %)".to_owned(),
-        format!("{}: {}", wall.joints, range(wall.joint_mm, 0)),
-    ]);
-    let [length, height] = wall.extent_m;
-    rows.push(vec![
-        "face between the outermost stones".to_owned(),
-        format!(
-            "{length:.1} m along, {height:.1} m up, {:.1} m\u{b2}",
-            wall.face_m2
         ),
-    ]);
+        ("median stone, width x height", extent(wall.size_m, 2)),
+        (
+            "joints, width in mm: median (5 to 95 %)",
+            format!("{}: {}", wall.joints, range(wall.joint_mm, 0)),
+        ),
+        (
+            "face between the outermost stones",
+            format!(
+                "{}, {:.1} m\u{b2}",
+                extent(Some(wall.extent_m), 1),
+                coverage.face_m2
+            ),
+        ),
+        (
+            "covered by stones and their joints",
+            format!("{:.1} %", 100.0 * coverage.covered),
+        ),
+        (
+            "surveyed, but without stones",
+            format!("{:.1} %", 100.0 * coverage.without_stones),
+        ),
+    ];
     if let Some(shape) = &wall.shape {
-        rows.push(vec![
-            "batter, horizontal for each metre of height".to_owned(),
-            format!("{:.3} \u{b1} {:.3}", shape.batter, 1.96 * shape.batter_sd),
-        ]);
+        let batter = format!("{:.3} \u{b1} {:.3}", shape.batter, 1.96 * shape.batter_sd);
+        rows.push(("batter, horizontal for each metre of height", batter));
         let plan = match shape.radius_m {
             Some(radius) if radius > 0.0 => format!("hollow, radius {radius:.1} m"),
             Some(radius) => format!("vaulted, radius {:.1} m", -radius),
             None => "straight, as far as the stones show it".to_owned(),
         };
-        rows.push(vec!["plan".to_owned(), plan]);
+        rows.push(("plan", plan));
+        let relief = format!("{} mm", number(wall.relief_mm.unwrap_or(f64::NAN), 0));
+        rows.push(("middles of the stones about that face, rms", relief));
     }
-    if let Some(relief) = wall.relief_mm {
-        rows.push(vec![
-            "middles of the stones about that face, rms".to_owned(),
-            format!("{relief:.0} mm"),
-        ]);
-    }
-    rows.push(vec![
-        "covered by stones and their joints".to_owned(),
-        format!("{:.1} %", 100.0 * wall.covered),
-    ]);
-    page.heading("The wall at the first survey")
-        .html(&table(&["", ""], &rows, None));
-    if wall.gaps.is_empty() {
-        return;
-    }
-    let gaps: Vec<Vec<String>> = { wall.gaps.iter() }
-        .map(|gap| {
-            vec![
-                format!("{:.1}, {:.1}", gap.along_m, gap.up_m),
-                format!("{:.1} x {:.1}", gap.width_m, gap.height_m),
-                format!("{:.2}", gap.area_m2),
-                format!("{:.0} %", 100.0 * gap.share_with_points),
-            ]
-        })
-        .collect();
-    page.heading("Parts of the face without stones").html(&table(
-        &[
-            "along, up, m",
-            "size, m",
-            "area, m\u{b2}",
-            "of it with points in the cloud",
-        ],
-        &gaps,
-        None,
-    ));
+    let rows = rows.into_iter().map(|(name, value)| [name.to_owned(), value]);
+    TextTable::new(["", ""], rows.collect())
 }

@@ -3,7 +3,8 @@
 use super::planned::PlannedSurvey;
 use super::squares::Squares;
 use crate::experiment::predicted::in_table;
-use crate::figure::{Axis, GREY, Item, Page, Plot, Ramp, table};
+use crate::experiment::tables::TextTable;
+use crate::figure::{Axis, GREY, Item, Page, Plot, Ramp};
 use stonewise_core::registration::ZONE_EXTENTS_M;
 
 /// Width of a map, pixels.
@@ -18,51 +19,40 @@ pub(super) fn page(surveys: &[(PlannedSurvey, Squares)]) -> String {
          space. In squares that are not seen, most stones are not measured.",
     );
     let three = |values: [Option<f64>; 3]| values.map(in_table).join(" / ");
-    let name = |survey: &PlannedSurvey| match &survey.added {
-        Some(name) => format!("with {name}"),
-        None => "as planned".to_owned(),
-    };
     let zones = ZONE_EXTENTS_M.map(|m| m.to_string()).join(" / ");
-    let rows: Vec<Vec<String>> = { surveys.iter() }
-        .map(|(survey, _)| {
-            let [stones, measured] = survey.stones;
-            let weakest = survey.weakest.map_or("\u{2013}".to_owned(), |w| {
-                format!("{:.2} at {:.1}, {:.1} m", w.sd_mm, w.along_m, w.up_m)
-            });
-            vec![
-                name(survey),
-                format!("{measured} of {stones}"),
-                weakest,
-                format!("{} of {}", survey.squares[1], survey.squares[0]),
-                three(survey.sd_mm),
-                three(survey.sd_deformation_mm),
-                three(survey.zones_mm),
-                three(survey.zones_in_face_mm),
-            ]
-        })
-        .collect();
-    page.html(&table(
-        &[
-            "survey",
-            "stones measured",
-            "weakest square",
-            "squares not seen",
-            "motion, along / up / out",
-            "deformation, along / up / out",
-            &format!("bulge of {zones} m that is found"),
-            &format!("motion in the face of a zone of {zones} m"),
-        ],
-        &rows,
-        None,
-    ));
-    let all = surveys.iter().flat_map(|(_, squares)| &squares.sd_m);
-    let largest = { all.flatten().filter(|sd| sd.is_finite()) }.fold(0.0, |a: f64, sd| a.max(1e3 * sd));
+    let row = |(survey, _): &(PlannedSurvey, Squares)| {
+        let ([stones, measured], [squares, unseen]) = (survey.stones, survey.squares);
+        let weakest =
+            { survey.weakest }.map(|w| format!("{:.2} at {:.1}, {:.1} m", w.sd_mm, w.along_m, w.up_m));
+        [
+            { survey.added.as_ref() }.map_or("as planned".to_owned(), |name| format!("with {name}")),
+            format!("{measured} of {stones}"),
+            weakest.unwrap_or("\u{2013}".to_owned()),
+            format!("{unseen} of {squares}"),
+            three(survey.sd_mm),
+            three(survey.sd_deformation_mm),
+            three(survey.zones_mm),
+            three(survey.zones_in_face_mm),
+        ]
+    };
+    let head = [
+        "survey",
+        "stones measured",
+        "weakest square",
+        "squares not seen",
+        "motion, along / up / out",
+        "deformation, along / up / out",
+        &format!("bulge of {zones} m that is found"),
+        &format!("motion in the face of a zone of {zones} m"),
+    ];
+    page.html(&TextTable::new(head, surveys.iter().map(row).collect()).html(None));
+    let all = surveys.iter().flat_map(|(_, squares)| &squares.sd_m).flatten();
+    let largest = { all.filter(|sd| sd.is_finite()) }.fold(0.0, |a: f64, sd| a.max(1e3 * sd));
     let ramp = Ramp {
         range: [0.0, if largest > 0.0 { largest } else { 1.0 }],
     };
     for (survey, squares) in surveys {
-        page.heading(&sources(survey));
-        page.html(&map(squares, ramp));
+        page.heading(&sources(survey)).html(&map(squares, ramp));
     }
     page.finish()
 }
@@ -78,7 +68,8 @@ fn sources(survey: &PlannedSurvey) -> String {
 }
 
 fn map(squares: &Squares, ramp: Ramp) -> String {
-    let end = |axis: usize| squares.size[axis] as f64 * squares.edge_m;
+    let edge = squares.edge_m;
+    let end = |axis: usize| squares.size[axis] as f64 * edge;
     let mut map = Plot::map(
         "standard deviation of the deformation in space; grey: not seen",
         Axis::around("along the wall (m)", [0.0, end(0)], false),
@@ -86,13 +77,15 @@ fn map(squares: &Squares, ramp: Ramp) -> String {
         MAP_PX,
         Some((ramp, "mm".to_owned())),
     );
-    let area = |(i, sd): (usize, &Option<f64>)| {
-        let sd_m = (*sd)?;
-        let [x, y] = [i % squares.size[0], i / squares.size[0]];
-        let corner = |dx: usize, dy: usize| [(x + dx) as f64, (y + dy) as f64].map(|v| v * squares.edge_m);
-        let colour = match sd_m.is_finite() {
-            true => ramp.colour(1e3 * sd_m),
-            false => GREY.to_owned(),
+    let area = |(i, sd_m): (usize, &Option<f64>)| {
+        let sd_m = (*sd_m)?;
+        let corner = |dx: usize, dy: usize| {
+            [i % squares.size[0] + dx, i / squares.size[0] + dy].map(|v| v as f64 * edge)
+        };
+        let colour = if sd_m.is_finite() {
+            ramp.colour(1e3 * sd_m)
+        } else {
+            GREY.to_owned()
         };
         Some((
             vec![corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)],

@@ -75,54 +75,39 @@ pub struct PlannedTargets {
     pub candidate: bool,
 }
 
-/// A class of scanner.
+/// A class of scanner; what is absent is that of a terrestrial scanner of 1.5 mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct PlannedInstrument {
     /// What stations call it.
     pub name: String,
     /// Range noise at 10 m, square on, metres.
-    #[serde(default = "range_noise_m")]
     pub range_noise_m: f64,
     /// Growth of the range noise beyond 10 m, metres per metre.
-    #[serde(default = "range_noise_per_m")]
     pub range_noise_per_m: f64,
     /// Angle noise across the beam, radians.
-    #[serde(default = "angle_noise_rad")]
     pub angle_noise_rad: f64,
     /// Diameter of the beam where it leaves the scanner, metres.
-    #[serde(default = "spot_m")]
     pub spot_m: f64,
     /// Half angle by which the beam widens, radians.
-    #[serde(default = "divergence_rad")]
     pub divergence_rad: f64,
     /// Angle between neighbouring beams, radians.
-    #[serde(default = "step_rad")]
     pub step_rad: f64,
 }
 
-fn range_noise_m() -> f64 {
-    BeamParams::terrestrial().range_noise_m
-}
-
-fn range_noise_per_m() -> f64 {
-    BeamParams::terrestrial().range_noise_per_m
-}
-
-fn angle_noise_rad() -> f64 {
-    BeamParams::terrestrial().pointing_noise_rad
-}
-
-fn spot_m() -> f64 {
-    2.0 * BeamParams::terrestrial().exit_radius_m
-}
-
-fn divergence_rad() -> f64 {
-    BeamParams::terrestrial().divergence_rad
-}
-
-fn step_rad() -> f64 {
-    StationPlace::default().step_rad
+impl Default for PlannedInstrument {
+    fn default() -> Self {
+        let beam = BeamParams::terrestrial();
+        Self {
+            name: String::new(),
+            range_noise_m: beam.range_noise_m,
+            range_noise_per_m: beam.range_noise_per_m,
+            angle_noise_rad: beam.pointing_noise_rad,
+            spot_m: 2.0 * beam.exit_radius_m,
+            divergence_rad: beam.divergence_rad,
+            step_rad: StationPlace::default().step_rad,
+        }
+    }
 }
 
 /// A place from which the wall is or may be scanned.
@@ -189,11 +174,15 @@ impl SurveyPlan {
         for i in &self.instruments {
             let key = |name: &str| format!("{name} of instrument {:?}", i.name);
             positive(key("step_rad"), i.step_rad)?;
-            not_negative(key("range_noise_m"), i.range_noise_m)?;
-            not_negative(key("range_noise_per_m"), i.range_noise_per_m)?;
-            not_negative(key("angle_noise_rad"), i.angle_noise_rad)?;
-            not_negative(key("spot_m"), i.spot_m)?;
-            not_negative(key("divergence_rad"), i.divergence_rad)?;
+            for (name, value) in [
+                ("range_noise_m", i.range_noise_m),
+                ("range_noise_per_m", i.range_noise_per_m),
+                ("angle_noise_rad", i.angle_noise_rad),
+                ("spot_m", i.spot_m),
+                ("divergence_rad", i.divergence_rad),
+            ] {
+                not_negative(key(name), value)?;
+            }
         }
         let mut names = BTreeSet::new();
         for s in &self.stations {
