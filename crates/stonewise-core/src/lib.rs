@@ -71,7 +71,7 @@ pub use nalgebra;
 
 pub mod change;
 pub mod cloud;
-mod components;
+pub mod components;
 pub mod epoch;
 pub mod evaluate;
 pub mod geometry;

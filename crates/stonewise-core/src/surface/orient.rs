@@ -308,7 +308,9 @@ fn ledges_upward(level: &[SurfaceCell], a_cell: f64) -> f64 {
         let share = majority(cells.iter().map(|&i| level[i].normal.z)) / count;
         share * LEDGE.max(a_cell * count)
     };
-    components(&neighbours(level)).into_iter().map(ledge).sum()
+    let next = neighbours(level);
+    let ledges = components(next.len(), |cell| next[cell].iter().copied());
+    ledges.into_iter().map(ledge).sum()
 }
 
 /// The value below which a part of all values lies; 0 without values.

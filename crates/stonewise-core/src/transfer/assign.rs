@@ -1,6 +1,7 @@
 //! Which instance of one photo is which instance of another.
 
 use super::overlap::Overlaps;
+use crate::components::components;
 use pathfinding::prelude::{Matrix, kuhn_munkres};
 use std::collections::BTreeMap;
 
@@ -38,34 +39,19 @@ pub(super) fn assign(overlaps: &Overlaps, min_iou: f64) -> Vec<(u32, u32)> {
 
 type Edge = (u32, u32, f64);
 
-/// Connected components of the graph of one pair of photos.
+/// Edges of one pair of photos that hang together, one sharing an instance with the next.
 fn blocks(edges: &[Edge]) -> Vec<Vec<Edge>> {
-    let mut block_of: BTreeMap<u32, usize> = BTreeMap::new();
-    let mut blocks: Vec<Vec<Edge>> = Vec::new();
-    for &(i, j, iou) in edges {
-        let target = match (block_of.get(&i).copied(), block_of.get(&j).copied()) {
-            (Some(a), Some(b)) if a != b => {
-                let (keep, lose) = (a.min(b), a.max(b));
-                let moved = std::mem::take(&mut blocks[lose]);
-                for &(k, l, _) in &moved {
-                    block_of.insert(k, keep);
-                    block_of.insert(l, keep);
-                }
-                blocks[keep].extend(moved);
-                keep
-            }
-            (Some(a), _) | (None, Some(a)) => a,
-            (None, None) => {
-                blocks.push(Vec::new());
-                blocks.len() - 1
-            }
-        };
-        block_of.insert(i, target);
-        block_of.insert(j, target);
-        blocks[target].push((i, j, iou));
+    let mut of_instance: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (number, &(i, j, _)) in edges.iter().enumerate() {
+        of_instance.entry(i).or_default().push(number);
+        of_instance.entry(j).or_default().push(number);
     }
-    blocks.retain(|b| !b.is_empty());
-    blocks
+    let beside = |number: usize| {
+        let (i, j, _) = edges[number];
+        of_instance[&i].iter().chain(&of_instance[&j]).copied()
+    };
+    let block = |numbers: Vec<usize>| numbers.into_iter().map(|number| edges[number]).collect();
+    components(edges.len(), beside).into_iter().map(block).collect()
 }
 
 fn solve(block: &[Edge]) -> Vec<(u32, u32)> {

@@ -1,6 +1,7 @@
 //! Parts of a stone that are cut off from its main body.
 
 use super::TransferParams;
+use crate::components::components;
 use crate::geometry::{CellMap, CellSet, cell_of, cells_around};
 use nalgebra::Point3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -113,24 +114,15 @@ impl Removal {
     }
 }
 
-fn parts(mut voxels: BTreeMap<Voxel, u32>) -> Vec<Part> {
-    let mut parts = Vec::new();
-    while let Some((seed, count)) = voxels.pop_first() {
-        let mut part = (vec![seed], u64::from(count));
-        let mut next = 0;
-        while next < part.0.len() {
-            let v = part.0[next];
-            next += 1;
-            for n in cells_around(v) {
-                if let Some(count) = voxels.remove(&n) {
-                    part.0.push(n);
-                    part.1 += u64::from(count);
-                }
-            }
-        }
-        parts.push(part);
-    }
-    parts
+fn parts(voxels: BTreeMap<Voxel, u32>) -> Vec<Part> {
+    let (places, counts): (Vec<Voxel>, Vec<u32>) = voxels.into_iter().unzip();
+    let places = &places;
+    let beside = |i: usize| cells_around(places[i]).filter_map(|n| places.binary_search(&n).ok());
+    let part = |members: Vec<usize>| {
+        let points = members.iter().map(|&i| u64::from(counts[i])).sum();
+        (members.into_iter().map(|i| places[i]).collect(), points)
+    };
+    components(places.len(), beside).into_iter().map(part).collect()
 }
 
 #[cfg(test)]

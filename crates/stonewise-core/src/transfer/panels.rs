@@ -121,7 +121,7 @@ fn leaves(stones: &[Stone], near: &[Vec<usize>]) -> Vec<Vec<usize>> {
             next[j].push(i);
         }
     }
-    let mut leaves = components(&next);
+    let mut leaves = components(next.len(), |stone| next[stone].iter().copied());
     leaves.retain(|leaf| leaf.len() >= LEAST_FIELDS);
     leaves
 }

@@ -24,15 +24,13 @@ impl Bodies {
         for (i, cell) in cells.iter().enumerate() {
             at.entry(cell.cell).or_insert(i);
         }
-        let joined = |(i, cell): (usize, &&SurfaceCell)| -> Vec<usize> {
+        let joined = |i: usize| {
+            let (at, cell) = (&at, cells[i]);
             let [low, high] = [-REACH, REACH].map(|step| cell.cell.map(|c| c + step));
             let around = cells_between(low, high).filter_map(|key| at.get(&key).copied());
-            around
-                .filter(|j| *j != i && are_joined(cell, cells[*j]))
-                .collect()
+            around.filter(move |j| *j != i && are_joined(cell, cells[*j]))
         };
-        let neighbours: Vec<Vec<usize>> = cells.iter().enumerate().map(joined).collect();
-        let bodies = components(&neighbours).into_iter().enumerate();
+        let bodies = components(cells.len(), joined).into_iter().enumerate();
         let of_body = bodies.flat_map(|(body, members)| members.into_iter().map(move |i| (i, body)));
         Self(of_body.map(|(i, body)| (cells[i].cell, body)).collect())
     }

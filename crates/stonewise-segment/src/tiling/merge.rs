@@ -6,6 +6,7 @@ use super::options::TilingOptions;
 use super::overlap::{common_pixels, extent, intersection, pixels_in};
 use crate::{Patch, Segmentation};
 use std::collections::BTreeMap;
+use stonewise_core::components::components;
 use stonewise_core::raster::{LabelImage, Raster, connected_components};
 
 /// Two cut masks of neighbouring tiles are one stone if, where both tiles see, this share of the smaller lies
@@ -83,32 +84,22 @@ fn without_fragments(painted: &LabelImage, scores: &[f32], min_area_px: u32) -> 
 /// Cut masks of which neighbouring tiles show parts of one stone, joined; the others are left out. Cost:
 /// O(n^2) tests of rectangles.
 fn joined(cut: Vec<Candidate>) -> Vec<Candidate> {
-    let mut group: Vec<usize> = (0..cut.len()).collect();
+    let mut same = vec![Vec::new(); cut.len()];
     for second in 0..cut.len() {
         for first in 0..second {
-            let (a, b) = (root(&mut group, first), root(&mut group, second));
-            if a != b && is_same_stone(&cut[first], &cut[second]) {
-                group[a.max(b)] = a.min(b);
+            if is_same_stone(&cut[first], &cut[second]) {
+                same[first].push(second);
+                same[second].push(first);
             }
         }
     }
-    let mut members: BTreeMap<usize, Vec<&Candidate>> = BTreeMap::new();
-    for (index, candidate) in cut.iter().enumerate() {
-        members
-            .entry(root(&mut group, index))
-            .or_default()
-            .push(candidate);
-    }
-    let several = members.into_values().filter(|members| members.len() > 1);
-    several.map(|members| union(&members)).collect()
-}
-
-fn root(group: &mut [usize], mut index: usize) -> usize {
-    while group[index] != index {
-        group[index] = group[group[index]];
-        index = group[index];
-    }
-    index
+    let mut groups = components(cut.len(), |mask| same[mask].iter().copied());
+    groups.retain(|members| members.len() > 1);
+    let whole = |mut members: Vec<usize>| {
+        members.sort_unstable();
+        union(&members.into_iter().map(|i| &cut[i]).collect::<Vec<_>>())
+    };
+    groups.into_iter().map(whole).collect()
 }
 
 fn is_same_stone(a: &Candidate, b: &Candidate) -> bool {

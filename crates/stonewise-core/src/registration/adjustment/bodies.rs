@@ -38,7 +38,7 @@ pub(crate) fn bodies(adjustment: &Adjustment) -> Vec<u32> {
             next[edge.high].push(edge.low);
         }
     }
-    let mut parts = components(&next);
+    let mut parts = components(next.len(), |stone| next[stone].iter().copied());
     // Of equally large ones the one with the lowest stone stays first.
     parts.sort_by_key(|part| std::cmp::Reverse(part.len()));
     let mut body = vec![0; next.len()];

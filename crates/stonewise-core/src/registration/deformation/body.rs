@@ -95,7 +95,10 @@ impl<'a> Body<'a> {
             Self::new(motions, errors, &parts)
         };
 
-        components(&next).iter().map(of_wall).collect()
+        components(next.len(), |part| next[part].iter().copied())
+            .iter()
+            .map(of_wall)
+            .collect()
     }
 
     /// `parts`: with whether their stones count.

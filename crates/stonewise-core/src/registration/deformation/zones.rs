@@ -49,7 +49,7 @@ pub(super) fn zones(body: &Body, rigid: &RigidPart, scan: &Scan) -> Vec<Deformat
             next[*high].push(*low);
         }
     }
-    let parts = components(&next);
+    let parts = components(next.len(), |stone| next[stone].iter().copied());
     let of_part = |stones: &Vec<usize>| {
         let zone = (stones.len() >= LEAST_STONES).then(|| zone(body, rigid, stones))?;
         (zone.interval_m[0] > 0.0).then_some(zone)

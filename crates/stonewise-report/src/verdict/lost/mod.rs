@@ -3,9 +3,9 @@
 mod place;
 mod wall;
 
-use pathfinding::prelude::components;
 use place::{Place, State};
 use stonewise_core::change::M3c2Params;
+use stonewise_core::components::components;
 use stonewise_results::{ResultSet, Squares, Status, StoneRow};
 use wall::Wall;
 
@@ -81,11 +81,11 @@ fn squares(places: &[Place]) -> Squares {
 /// For each place whether it belongs to a hole, of one stone or of several, around which the wall is covered.
 fn covered_holes(places: &[Place], squares: &Squares) -> Vec<bool> {
     let is_gone = |place: &Place| matches!(place.state, State::SeenThrough | State::Empty);
-    let mut holes = Vec::new();
+    // Places that make one hole with each other.
+    let mut next = vec![Vec::new(); places.len()];
     // Of the core points around each place, outside its hole: those that see a surface, and all.
     let mut around = vec![[0usize; 2]; places.len()];
     for (number, place) in places.iter().enumerate().filter(|(_, p)| is_gone(p)) {
-        let mut hole = vec![number];
         for (at, seen) in &place.around {
             let others = squares.near(at).iter().copied().filter(|&other| other != number);
             let inside: Vec<usize> = others
@@ -95,12 +95,14 @@ fn covered_holes(places: &[Place], squares: &Squares) -> Vec<bool> {
                 around[number][0] += usize::from(seen.is_some_and(|seen| place.sees_surface(&seen)));
                 around[number][1] += 1;
             }
-            hole.extend(inside);
+            for other in inside {
+                next[number].push(other);
+                next[other].push(number);
+            }
         }
-        holes.push(hole);
     }
     let mut is_covered = vec![false; places.len()];
-    for hole in components(&holes) {
+    for hole in components(places.len(), |place| next[place].iter().copied()) {
         let sum = |k: usize| hole.iter().map(|&i| around[i][k]).sum::<usize>();
         let [covered, all] = [sum(0), sum(1)];
         for place in hole {
