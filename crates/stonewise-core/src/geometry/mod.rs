@@ -29,7 +29,7 @@ pub use moments::Moments;
 pub use outline::{OutlineParams, convex_hull, face_outline, outline, outlines};
 pub use plane::Plane;
 pub use rigid::Rigid3;
-pub use ring::{is_simple, ring_contains, signed_area};
+pub use ring::{is_simple, ring_contains, signed_area, simplify_ring};
 pub use ring_index::RingIndex;
 pub use rotation::nearest_rotation;
 pub use small_motion::{DisplacementSample, SmallMotion, lever};

@@ -1,6 +1,6 @@
 //! The outlines of a patch of points.
 
-use crate::geometry::ring::{is_simple, ring_contains, signed_area};
+use crate::geometry::ring::{is_simple, ring_contains, signed_area, simplify_ring};
 use crate::geometry::{FaceFrame, RingIndex, contour};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -122,7 +122,7 @@ fn pieces(points: &[Point2<f64>], params: &OutlineParams) -> Vec<Vec<Point2<f64>
     let level = ((radius - 0.5 * spacing) / cell).max(0.5);
     let in_metres = |ring: Vec<Point2<f64>>| {
         let ring = ring.iter().map(|p| origin + p.coords * cell).collect();
-        simplify_ring(ring, params.simplify_spacings * spacing)
+        simplest(ring, params.simplify_spacings * spacing)
     };
     let traced = contour::trace(&depth, width, height, level);
     traced.into_iter().map(in_metres).collect()
@@ -180,58 +180,18 @@ pub fn convex_hull(points: &[Point2<f64>]) -> Vec<Point2<f64>> {
     hull
 }
 
-/// The ring simplified by Douglas-Peucker. Where the result crosses itself, the tolerance is halved, up to three
+/// The ring simplified. Where the result crosses itself, the tolerance is halved, up to three
 /// times; the ring itself where that is not enough.
-fn simplify_ring(ring: Vec<Point2<f64>>, tolerance: f64) -> Vec<Point2<f64>> {
+fn simplest(ring: Vec<Point2<f64>>, tolerance: f64) -> Vec<Point2<f64>> {
     let mut tolerance = tolerance;
     for _ in 0..4 {
-        let simpler = douglas_peucker_ring(&ring, tolerance);
+        let simpler = simplify_ring(&ring, tolerance);
         if simpler.len() >= 3 && signed_area(&simpler) > 0.0 && is_simple(&simpler) {
             return simpler;
         }
         tolerance /= 2.0;
     }
     ring
-}
-
-/// Douglas-Peucker on a ring, cut at two opposite corners: the vertex of smallest x and the one farthest from
-/// it.
-fn douglas_peucker_ring(ring: &[Point2<f64>], tolerance: f64) -> Vec<Point2<f64>> {
-    let n = ring.len();
-    let first = (0..n)
-        .min_by(|&a, &b| ring[a].x.total_cmp(&ring[b].x))
-        .unwrap_or(0);
-    let rotated: Vec<Point2<f64>> = (0..=n).map(|i| ring[(first + i) % n]).collect();
-    let far = (0..n)
-        .max_by(|&a, &b| {
-            (rotated[a] - rotated[0])
-                .norm()
-                .total_cmp(&(rotated[b] - rotated[0]).norm())
-        })
-        .unwrap_or(0);
-    let mut keep = vec![false; n + 1];
-    keep[0] = true;
-    keep[far] = true;
-    let mut open = vec![(0, far), (far, n)];
-    while let Some((from, to)) = open.pop() {
-        let distance = |i: usize| distance_to_segment(&rotated[i], &rotated[from], &rotated[to]);
-        let worst = (from + 1..to).max_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-        if let Some(worst) = worst.filter(|&i| distance(i) > tolerance) {
-            keep[worst] = true;
-            open.extend([(from, worst), (worst, to)]);
-        }
-    }
-    (0..n).filter(|&i| keep[i]).map(|i| rotated[i]).collect()
-}
-
-fn distance_to_segment(p: &Point2<f64>, a: &Point2<f64>, b: &Point2<f64>) -> f64 {
-    let (ab, ap) = (b - a, p - a);
-    let along = if ab.norm_squared() > 0.0 {
-        (ap.dot(&ab) / ab.norm_squared()).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
-    (ap - ab * along).norm()
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ pub type Ring = Vec<[f64; 2]>;
 /// Outlines of every label but 0: rings along pixel edges, with corners only.
 ///
 /// Filling a label's rings by the even-odd rule gives its pixels back exactly. Outer rings have positive
-/// [`ring_area`], holes negative. Pixels that touch only at a corner are apart. Cost: O(pixels + boundary).
+/// [area](crate::geometry::signed_area), holes negative. Pixels that touch only at a corner are apart. Cost: O(pixels + boundary).
 pub fn label_outlines(labels: &LabelImage) -> BTreeMap<u32, Vec<Ring>> {
     let mut edges: BTreeMap<u32, Edges> = BTreeMap::new();
     let (width, height) = (labels.width(), labels.height());
@@ -42,16 +42,6 @@ pub fn label_outlines(labels: &LabelImage) -> BTreeMap<u32, Vec<Ring>> {
         .into_iter()
         .map(|(label, edges)| (label, link(edges)))
         .collect()
-}
-
-/// Signed area of a ring, square pixels; positive where it runs clockwise on the screen (x right, y down).
-pub fn ring_area(ring: &[[f64; 2]]) -> f64 {
-    let next = ring.iter().cycle().skip(1);
-    ring.iter()
-        .zip(next)
-        .map(|(a, b)| a[0] * b[1] - b[0] * a[1])
-        .sum::<f64>()
-        / 2.0
 }
 
 /// Border edges by the corner (y, x) they start from, a bit for each heading; the label lies to the right of

@@ -10,7 +10,7 @@ mod srgb;
 mod sum_table;
 
 pub use components::{Component, connected_components};
-pub use contour::{Ring, label_outlines, ring_area};
+pub use contour::{Ring, label_outlines};
 pub use polygon::fill_polygon;
 pub use raster_type::{DepthMap, LabelImage, Raster, RgbImage};
 pub use relief::{RELIEF_CHANNELS, RangeImage, ReliefMap};

@@ -4,8 +4,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use stonewise_core::geometry::signed_area;
 use stonewise_core::raster::{
-    LabelImage, Raster, Ring, Rle, RleError, connected_components, fill_polygon, label_outlines, ring_area,
+    LabelImage, Raster, Ring, Rle, RleError, connected_components, fill_polygon, label_outlines,
 };
 
 #[derive(Deserialize)]
@@ -234,10 +235,10 @@ fn outlines_fill_back_to_the_same_pixels() {
             let mut ours = Raster::filled(labels.width(), labels.height(), 0);
             paint(&rings, &mut ours);
             assert_eq!(ours, expected);
-            let area: f64 = rings.iter().map(|ring| ring_area(ring)).sum();
+            let area: f64 = rings.iter().map(|ring| signed_area(ring)).sum();
             assert_eq!(area, f64::from(expected.data().iter().sum::<u32>()));
             let (_, parts) = connected_components(&expected);
-            let outer = rings.iter().filter(|ring| ring_area(ring) > 0.0).count();
+            let outer = rings.iter().filter(|ring| signed_area(ring) > 0.0).count();
             assert_eq!(outer, parts.len());
         }
     }

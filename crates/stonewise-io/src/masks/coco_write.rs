@@ -4,7 +4,8 @@ use super::{InstanceInfo, MaskError};
 use crate::atomic::write_atomically;
 use serde_json::{Value, json};
 use std::path::Path;
-use stonewise_core::raster::{LabelImage, Ring, Rle, label_outlines, ring_area};
+use stonewise_core::geometry::signed_area;
+use stonewise_core::raster::{LabelImage, Ring, Rle, label_outlines};
 
 /// A photo's masks, to be written.
 #[derive(Clone, Copy, Debug)]
@@ -71,11 +72,11 @@ impl CocoFile {
 }
 
 fn annotation(labels: &LabelImage, label: u32, rings: &[Ring]) -> Value {
-    let area: f64 = rings.iter().map(|ring| ring_area(ring)).sum();
+    let area: f64 = rings.iter().map(|ring| signed_area(ring)).sum();
     let vertices = || rings.iter().flatten();
     let low = |axis: usize| vertices().map(|v| v[axis]).fold(f64::INFINITY, f64::min);
     let high = |axis: usize| vertices().map(|v| v[axis]).fold(f64::NEG_INFINITY, f64::max);
-    let has_hole = rings.iter().any(|ring| ring_area(ring) < 0.0);
+    let has_hole = rings.iter().any(|ring| signed_area(ring) < 0.0);
     let segmentation = if has_hole {
         let [columns, rows] = [0, 1].map(|axis| low(axis) as u32..high(axis) as u32);
         let counts = Rle::of_label(labels, label, columns, rows).to_compressed();

@@ -1,6 +1,5 @@
 //! Photo crops of every stone, rectified to its face, and colours of the thinned cloud.
 
-use super::simplify::simplify;
 use super::thin::Candidate;
 use super::window::Window;
 use crate::error::Result;
@@ -14,9 +13,9 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use stonewise_core::epoch::EpochId;
 use stonewise_core::evaluate::MotionField;
-use stonewise_core::geometry::View;
+use stonewise_core::geometry::{View, signed_area, simplify_ring};
 use stonewise_core::id::ImageId;
-use stonewise_core::raster::{LabelImage, Raster, RgbImage, label_outlines, ring_area};
+use stonewise_core::raster::{LabelImage, Raster, RgbImage, label_outlines};
 use stonewise_core::statistics::upper_median;
 use stonewise_io::image_io::read_rgb;
 
@@ -203,7 +202,7 @@ fn area_px(window: &Window, view: &View, motion: Option<&MotionField>) -> Option
         }
         corners.push(projection.pixel);
     }
-    let area = ring_area(&corners);
+    let area = signed_area(&corners);
     (area > 0.0).then_some(area)
 }
 
@@ -243,14 +242,14 @@ fn cut(job: &Job, open: &OpenPhoto, motion: Option<&MotionField>, side_px: u32) 
         }
     }
     let rings = label_outlines(&mask).remove(&1).unwrap_or_default();
-    let large = rings.into_iter().filter(|r| ring_area(r).abs() >= MIN_PIECE_PX);
+    let large = rings.into_iter().filter(|r| signed_area(r).abs() >= MIN_PIECE_PX);
     let crop = Crop {
         stone_id: job.window.stone_id,
         photo: name.to_owned(),
         half_m: job.window.half_m,
         rings: large
             .map(|r| {
-                simplify(&r, OUTLINE_PX)
+                simplify_ring(&r, OUTLINE_PX)
                     .iter()
                     .map(|v| v.map(|c| c as f32))
                     .collect()

@@ -2,7 +2,6 @@
 
 mod crops;
 mod sections;
-mod simplify;
 mod thin;
 mod tracks;
 mod window;
