@@ -5,6 +5,7 @@ use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use stonewise_core::geometry::Bounds;
+use stonewise_core::statistics::upper_median;
 use stonewise_io::cloud::read_cloud;
 
 /// Points that take part; all others are as if they had not been measured.
@@ -62,8 +63,7 @@ impl Part {
     fn middle_of(points: Vec<Point3<f64>>, size_m: [f64; 2]) -> Option<Self> {
         let median = |axis: usize| {
             let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
-            values.sort_by(f64::total_cmp);
-            values.get(values.len() / 2).copied()
+            upper_median(&mut values)
         };
         let centre = Point3::new(median(0)?, median(1)?, median(2)?);
         let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);

@@ -2,6 +2,7 @@
 
 use super::islands::Voxel;
 use crate::geometry::{Plane, cell_of, cells_between};
+use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Point3, Vector3};
 use std::collections::HashMap;
 
@@ -48,8 +49,7 @@ impl FaceCells {
         for _ in 0..ITERATIONS {
             let residual = |p: &Point3<f64>| (p - plane.centroid).dot(&plane.normal);
             let mut sizes: Vec<f64> = points.iter().map(|p| residual(p).abs()).collect();
-            sizes.sort_by(f64::total_cmp);
-            let sigma = (1.4826 * sizes[sizes.len() / 2]).max(1e-4);
+            let sigma = (1.4826 * upper_median(&mut sizes)?).max(1e-4);
             let weights: Vec<f64> = points
                 .iter()
                 .map(|p| (1.0 - (residual(p) / (TUKEY * sigma)).powi(2)).max(0.0).powi(2))

@@ -11,6 +11,7 @@ use super::surface_cells::{LocalSurface, SurfaceCells, SurfaceGroup};
 use crate::cloud::{Cloud, TileSource};
 use crate::geometry::{Bounds, View};
 use crate::progress::Progress;
+use crate::statistics::upper_median;
 use nalgebra::{Point3, Vector3};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -87,9 +88,8 @@ impl<'a> Observer<'a> {
 
     /// Median point spacing over the cells of the whole cloud, metres.
     pub(super) fn spacing_m(&self) -> f64 {
-        let mut all: Vec<f32> = self.surfaces.iter().flat_map(SurfaceCells::spacings).collect();
-        all.sort_by(f32::total_cmp);
-        all.get(all.len() / 2).copied().map_or(0.0, f64::from)
+        let all = self.surfaces.iter().flat_map(SurfaceCells::spacings);
+        upper_median(&mut all.map(f64::from).collect::<Vec<_>>()).unwrap_or(0.0)
     }
 
     /// For each cell of a tile's surface, what `note` makes of the sightings of its chosen points by the

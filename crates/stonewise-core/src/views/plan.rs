@@ -6,6 +6,7 @@ use super::obstacles::{BEFORE_M, Bodies};
 use super::walls::Walls;
 use crate::geometry::{Camera, FaceFrame, NearPlane, Rigid3, View};
 use crate::id::ImageId;
+use crate::statistics::upper_median;
 use crate::surface::SurfaceCell;
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
@@ -320,8 +321,7 @@ impl Target<'_> {
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+    upper_median(&mut values).unwrap_or(0.0)
 }
 
 #[cfg(test)]

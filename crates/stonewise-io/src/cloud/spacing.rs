@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::Point3;
 use stonewise_core::geometry::cell_of;
+use stonewise_core::statistics::upper_median;
 
 /// Sizes of the cells that are looked at, metres: each is kept with all of its points, or not at all.
 const CELLS_M: [f64; 3] = [0.05, 0.5, 8.0];
@@ -111,8 +112,7 @@ impl Sample {
             }
             next -= sorted.len();
         }
-        distances.sort_unstable_by(f64::total_cmp);
-        Some((*distances.get(distances.len() / 2)?, distances.len(), searched))
+        Some((upper_median(&mut distances)?, distances.len(), searched))
     }
 }
 
@@ -122,8 +122,7 @@ fn median_of_all(points: &[Point3<f64>]) -> Option<f64> {
     sorted.sort_unstable_by(|a, b| a.x.total_cmp(&b.x));
     let distances = (0..sorted.len()).map(|of| nearest_m(&sorted, of));
     let mut distances: Vec<f64> = distances.filter(|d| d.is_finite()).collect();
-    distances.sort_unstable_by(f64::total_cmp);
-    distances.get(distances.len() / 2).copied()
+    upper_median(&mut distances)
 }
 
 /// Distance of a point to the nearest other one, of points in order of x.

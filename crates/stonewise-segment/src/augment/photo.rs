@@ -3,6 +3,7 @@
 use crate::Sample;
 use crate::tiling::at_scale;
 use stonewise_core::raster::{RgbImage, connected_components};
+use stonewise_core::statistics::upper_median;
 
 /// Smaller images of a photo are made down to this length of the shorter side.
 const LEAST_SIDE_PX: u32 = 64;
@@ -93,10 +94,9 @@ impl Photo {
 
 fn typical_size(sample: &Sample) -> f64 {
     let (_, parts) = connected_components(sample.labels());
-    let mut areas: Vec<u32> = parts.iter().map(|p| p.area).collect();
-    areas.sort_unstable();
-    match areas.get(areas.len() / 2) {
-        Some(&area) => f64::from(area).sqrt(),
+    let mut areas: Vec<f64> = parts.iter().map(|p| f64::from(p.area)).collect();
+    match upper_median(&mut areas) {
+        Some(area) => area.sqrt(),
         None => f64::from(sample.image().width().min(sample.image().height())),
     }
 }

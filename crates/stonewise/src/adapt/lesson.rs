@@ -16,6 +16,7 @@ use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::View;
 use stonewise_core::id::StoneId;
 use stonewise_core::raster::{LabelImage, Raster};
+use stonewise_core::statistics::upper_median;
 use stonewise_core::stone::Stone;
 use stonewise_io::masks::write_label_png;
 
@@ -226,8 +227,7 @@ fn refused(project: &Project, why: &str) -> Error {
 /// Edge of a block, metres.
 fn edge_m(stones: &[Stone]) -> f64 {
     let mut areas: Vec<f64> = stones.iter().map(|s| s.area_m2).collect();
-    areas.sort_by(f64::total_cmp);
-    let typical = areas.get(areas.len() / 2).map_or(1.0, |area| area.sqrt());
+    let typical = upper_median(&mut areas).map_or(1.0, f64::sqrt);
     BLOCK_STONES * typical.max(f64::MIN_POSITIVE)
 }
 

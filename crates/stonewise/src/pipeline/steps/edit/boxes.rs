@@ -10,6 +10,7 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::geometry::{OutlineParams, View, cell_of, outline};
+use stonewise_core::statistics::upper_median;
 use stonewise_core::transfer::NoEffect;
 use stonewise_io::image_io::read_rgb;
 use stonewise_segment::tiling::outline_boxes;
@@ -62,8 +63,7 @@ impl Boxed {
     /// Places and points of the face.
     fn face(&self) -> Vec<(Point2<f64>, Point3<f64>)> {
         let mut depths: Vec<f64> = self.points.values().map(|p| p.1).collect();
-        depths.sort_by(f64::total_cmp);
-        let Some(middle) = depths.get(depths.len() / 2) else {
+        let Some(middle) = upper_median(&mut depths) else {
             return Vec::new();
         };
         let near = self.points.values().filter(|p| (p.1 - middle).abs() <= DEPTH_M);
