@@ -11,8 +11,8 @@
 //! conditional mean and covariance of r, given all d_i, are generalised least squares.
 
 use crate::geometry::lever;
+use crate::statistics::chi_square_p;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Point3, SMatrix, Vector3, Vector6};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Standard deviation of a registration of which nothing is known: of a shift, and of a rotation at a typical
 /// arm, metres.
@@ -147,13 +147,15 @@ pub fn agreement(
         let square = covariance
             .cholesky()
             .map(|c| difference.dot(&c.solve(&difference)));
-        of.p = square.and_then(|square| tail(square, rows.len()));
+        of.p = square
+            .filter(|_| !rows.is_empty())
+            .map(|square| chi_square_p(square, rows.len()));
         of
     };
 
     Some(Agreement {
         instruments: (0..differences.len()).map(tested).collect(),
-        p: tail(square, count.saturating_sub(shown)),
+        p: (count > shown).then(|| chi_square_p(square, count - shown)),
         error,
         is_determined: known.is_some() || shown == 6,
     })
@@ -181,12 +183,6 @@ fn shown(prior: &Matrix6<f64>, posterior: &Matrix6<f64>) -> Option<usize> {
         .iter()
         .all(|v| v.is_finite())
         .then(|| eigen.iter().filter(|v| **v < least).count())
-}
-
-/// Probability that a chi-square is larger.
-fn tail(square: f64, freedom: usize) -> Option<f64> {
-    let law = ChiSquared::new(freedom as f64).ok()?;
-    (freedom > 0).then(|| law.sf(square))
 }
 
 fn to_vector(v: &DVector<f64>) -> Vector6<f64> {

@@ -1,7 +1,7 @@
 //! Order statistics and mixed bits that several modules share.
 
 use nalgebra::Vector3;
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use std::f64::consts::TAU;
 
 /// From this many degrees of freedom on, Student's quantile follows from the normal one by an expansion to 5e-5
@@ -127,6 +127,11 @@ pub fn discoveries(p_values: &[Option<f64>], rate: f64) -> Vec<usize> {
     found.map(|(i, _)| i).collect()
 }
 
+/// Probability that the squares of `freedom` standard normal numbers sum to more than `square`; 1 where `freedom` is 0.
+pub fn chi_square_p(square: f64, freedom: usize) -> f64 {
+    ChiSquared::new(freedom as f64).map_or(1.0, |law| law.sf(square))
+}
+
 /// Student's 97.5 % quantile; `z`: the normal one. The expansion is Abramowitz & Stegun (1964), 26.7.5.
 pub(crate) fn student_95(freedom: f64, z: f64) -> f64 {
     if freedom < EXPANDED_FROM {
@@ -164,6 +169,15 @@ mod tests {
             .unwrap()
             .inverse_cdf(UPPER_95);
         assert!((student_95(EXPANDED_FROM, z) / exact - 1.0).abs() < 5e-5);
+    }
+
+    #[test]
+    fn probabilities_are_those_of_the_table() {
+        // Published upper 5 % points of chi-square.
+        for (freedom, square) in [(1, 3.841), (3, 7.815), (10, 18.307)] {
+            assert!((chi_square_p(square, freedom) - 0.05).abs() < 2e-5);
+        }
+        assert_eq!((chi_square_p(9.0, 0), chi_square_p(0.0, 3)), (1.0, 1.0));
     }
 
     #[test]

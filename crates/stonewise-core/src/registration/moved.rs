@@ -1,8 +1,7 @@
 //! Which stones moved, when many are tested and share the error of the epochs.
 
-use crate::statistics::discoveries;
+use crate::statistics::{chi_square_p, discoveries};
 use nalgebra::{Matrix3, Vector3};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// For each stone whether it moved, with the false discovery rate at most `rate`. `None`: not measured, and
 /// not tested.
@@ -13,8 +12,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// harm: the tests are positively dependent (Benjamini & Yekutieli 2001). Source: Benjamini & Hochberg 1995.
 pub fn moved_stones(motions: &[Option<(Vector3<f64>, Matrix3<f64>)>], rate: f64) -> Vec<bool> {
     let p_still = |(motion, covariance): &(Vector3<f64>, Matrix3<f64>)| {
-        let chi_square = motion.dot(&covariance.cholesky()?.solve(motion));
-        Some(ChiSquared::new(3.0).ok()?.sf(chi_square))
+        Some(chi_square_p(motion.dot(&covariance.cholesky()?.solve(motion)), 3))
     };
     let p_values: Vec<Option<f64>> = motions.iter().map(|m| m.as_ref().and_then(p_still)).collect();
     let mut moved = vec![false; motions.len()];

@@ -7,9 +7,9 @@ use super::breaks::BROKEN;
 use super::state::Adjustment;
 use crate::components::components;
 use crate::geometry::{DisplacementSample, SmallMotion};
+use crate::statistics::chi_square_p;
 use crate::stone::{MotionFailure, PairResult, StoneMotion};
 use nalgebra::{Matrix3, Vector3};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Probability that a body which moves with the wall departs from it as far by chance, below which it
 /// disagrees. A motion that nothing confirms must not be called significant; at one in a thousand, that would need a
@@ -119,7 +119,7 @@ impl Body<'_> {
         let square = covariance
             .try_inverse()
             .map_or(0.0, |inverse| apart.dot(&(inverse * apart)));
-        is_improbable(square, 3, DISAGREES)
+        chi_square_p(square, 3) < DISAGREES
     }
 
     /// Whether something other than the ties confirms its motion: photos, where they find most stones, or else
@@ -155,17 +155,12 @@ impl Body<'_> {
             square += apart.dot(&(inverse * apart));
             stones += 1;
         }
-        stones >= CONFIRMING_STONES && !is_improbable(square, 3 * (stones - 1), SCATTERED)
+        stones >= CONFIRMING_STONES && chi_square_p(square, 3 * (stones - 1)) >= SCATTERED
     }
 }
 
 fn translation_covariance(motion: &StoneMotion) -> Matrix3<f64> {
     motion.covariance.fixed_view::<3, 3>(0, 0).into_owned()
-}
-
-/// Whether the sum of squares of `freedom` standard normal variables exceeds `square` with less than this probability.
-fn is_improbable(square: f64, freedom: usize, probability: f64) -> bool {
-    ChiSquared::new(freedom as f64).is_ok_and(|law| law.sf(square) < probability)
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@ use super::observation::NormalEquations;
 use super::solution::Solution;
 use super::state::{Adjustment, Evidence};
 use super::stone_vector::{Matrix9, Vector9};
+use crate::statistics::chi_square_p;
 use nalgebra::{Matrix3, SMatrix};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Share of the largest information on bending below which a direction of it counts as not observed: the
 /// rounding of double precision.
@@ -68,8 +68,7 @@ fn p_values(adjustment: &Adjustment, solution: &Solution) -> Vec<Option<f64>> {
 /// Bending is free: a bent face is not a loose stone.
 fn p_value(equations: &NormalEquations, prediction: &Prediction, own: &[f64; 9]) -> Option<f64> {
     let (misfit, freedom) = posterior(&with_free_bending(equations), prediction, own).misfit;
-    let law = ChiSquared::new(freedom as f64).ok()?;
-    (freedom > 0).then(|| law.sf(misfit))
+    (freedom > 0).then(|| chi_square_p(misfit, freedom))
 }
 
 /// Equations of translation and rotation with any bending eliminated; the constant is not carried along.

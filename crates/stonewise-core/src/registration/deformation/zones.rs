@@ -6,9 +6,9 @@ use super::rigid_part::RigidPart;
 use super::scan::Scan;
 use crate::components::components;
 use crate::geometry::FaceFrame;
-use crate::statistics::discoveries;
+use crate::statistics::{chi_square_p, discoveries};
 use nalgebra::{Matrix3, Vector3};
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeSet;
 
 /// Share of false discoveries that is accepted among the stones of all zones.
@@ -35,11 +35,7 @@ const LEVEL: f64 = 0.7;
 /// begins at zero, are no zone. If none is left, the zone is the most likely bulge, with the amplitude that the stones'
 /// own observations give it, as the field smooths weak motions.
 pub(super) fn zones(body: &Body, rigid: &RigidPart, scan: &Scan) -> Vec<DeformationZone> {
-    let law = ChiSquared::new(3.0).ok();
-    let p = |(i, square): (usize, &f64)| {
-        let is_firm = body.stones[i].is_firm;
-        law.as_ref().filter(|_| is_firm).map(|law| law.sf(*square))
-    };
+    let p = |(i, square): (usize, &f64)| body.stones[i].is_firm.then(|| chi_square_p(*square, 3));
     let p_values: Vec<Option<f64>> = rigid.squares.iter().enumerate().map(p).collect();
     let moved: BTreeSet<usize> = discoveries(&p_values, FALSE_DISCOVERY_RATE).into_iter().collect();
     let mut next = vec![Vec::new(); body.stones.len()];

@@ -4,8 +4,8 @@ use super::assumptions::Model;
 use super::model::{Problem, Solution, Unknowns};
 use super::observation::Observation;
 use super::sight::StablePlane;
+use crate::statistics::chi_square_p;
 use nalgebra::{Matrix3, Vector3};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
 
@@ -117,7 +117,7 @@ impl Motion {
             }
         }
         Self {
-            p_still: ChiSquared::new(f64::from(seen)).map_or(1.0, |law| law.sf(chi_square)),
+            p_still: chi_square_p(chi_square, seen),
             chi_square,
             length_m: f64::sqrt(square),
         }

@@ -7,9 +7,9 @@ use super::model::{Problem, Unknowns};
 use super::observation::Observation;
 use super::rigid::{RigidError, rigid_rows};
 use super::stable::stable_observations;
+use crate::statistics::chi_square_p;
 use nalgebra::{Cholesky, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// The later epoch's error as surfaces off the wall show it, and as it was found without them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,6 +75,6 @@ pub(super) fn cross_check(
         error: shift(&shown),
         found: shift(found),
         covariance: of_shift(found),
-        p: ChiSquared::new(3.0).map_or(1.0, |law| law.sf(chi_square)),
+        p: chi_square_p(chi_square, 3),
     })
 }
