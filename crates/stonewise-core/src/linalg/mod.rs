@@ -6,13 +6,14 @@ mod block;
 mod dense;
 mod fused;
 mod selected_inverse;
+mod symmetric;
 #[cfg(test)]
 mod tests;
-mod without_negative;
 
 pub(crate) use band::{Band, BandFactor, BandInverse};
 pub(crate) use block::{BlockFactor, BlockMatrix, BlockPattern};
 pub(crate) use dense::DenseFactor;
 pub(crate) use fused::{add_scaled, mul_add};
 pub(crate) use selected_inverse::SelectedInverse;
-pub use without_negative::without_negative;
+pub(crate) use symmetric::root;
+pub use symmetric::without_negative;

@@ -8,7 +8,7 @@ use super::octaves::Octaves;
 use super::solution::Solution;
 use super::state::{Adjustment, Evidence};
 use super::stone_vector::Vector9;
-use crate::linalg::without_negative;
+use crate::linalg::{root, without_negative};
 use crate::stone::{MotionFailure, PairResult};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
@@ -102,11 +102,4 @@ pub(super) fn joint_motions(
         octaves: adjustment.octaves(),
         step_m: adjustment.step_m().unwrap_or(f64::INFINITY),
     }
-}
-
-/// Symmetric root of a covariance.
-fn root(covariance: &Matrix3<f64>) -> Matrix3<f64> {
-    let eigen = covariance.symmetric_eigen();
-    let roots = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
-    eigen.eigenvectors * Matrix3::from_diagonal(&roots) * eigen.eigenvectors.transpose()
 }

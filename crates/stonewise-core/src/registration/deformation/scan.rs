@@ -15,6 +15,7 @@ use super::bulge::{Bulge, Direction, MostLikely, Score};
 use super::found::{LEVEL, OUTSIDE, ZONE_EXTENTS_M};
 use super::random::Random;
 use super::smoothed::smoothed;
+use crate::linalg::root;
 use crate::registration::bulges::{self, IN_FACE, OUT, Shape, shapes};
 use crate::statistics::upper_median;
 use nalgebra::{Const, Dyn, Matrix3, Matrix6, OMatrix, SMatrix, Vector3, Vector6};
@@ -278,11 +279,4 @@ fn bulges(body: &Body, firm: &[usize], model: &Model) -> Vec<Bulge> {
     };
     let shapes = shapes(firm, |i| body.stones[i].joint.place);
     shapes.into_par_iter().map(bulge).collect()
-}
-
-/// Symmetric root of an information matrix.
-fn root(information: &Matrix3<f64>) -> Matrix3<f64> {
-    let eigen = information.symmetric_eigen();
-    let roots = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
-    eigen.eigenvectors * Matrix3::from_diagonal(&roots) * eigen.eigenvectors.transpose()
 }
