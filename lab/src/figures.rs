@@ -3,11 +3,6 @@
 use nalgebra::{Matrix3, Vector3};
 use stonewise_core::statistics;
 
-/// Half-width of a 95 % interval, standard deviations.
-pub const Z95: f64 = 1.959_963_984_540_054;
-/// 95 % quantile of chi-square with three degrees of freedom.
-pub const CHI2_3_95: f64 = 7.814_727_903_251_179;
-
 /// Root mean square.
 pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     let squares: Vec<f64> = values.into_iter().map(|v| v * v).collect();
@@ -25,18 +20,6 @@ pub fn share(count: usize, holds: impl Fn(usize) -> bool) -> f64 {
     (0..count).filter(|&i| holds(i)).count() as f64 / count as f64
 }
 
-/// Coverage of the 95 % intervals of errors on an axis; `errors`: errors and their standard deviations.
-pub fn coverage(errors: &[&[Vector3<f64>; 2]], axis: usize) -> String {
-    let inside = errors.iter().filter(|[e, sd]| e[axis].abs() <= Z95 * sd[axis]);
-    format!("{:.3}", inside.count() as f64 / errors.len().max(1) as f64)
-}
-
-/// Root mean squares of errors (`part` 0) or standard deviations (1) along, up and out, thousandths of their unit.
-pub fn rms_of_axes(errors: &[&[Vector3<f64>; 2]], part: usize) -> String {
-    let axis = |a: usize| format!("{:.3}", 1e3 * rms(errors.iter().map(|s| s[part][a])));
-    [0, 1, 2].map(axis).join(" / ")
-}
-
 /// Square of a vector in units of its covariance; infinite where that has no inverse.
 pub fn chi_square(v: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
     covariance
@@ -44,14 +27,17 @@ pub fn chi_square(v: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
         .map_or(f64::INFINITY, |c| v.dot(&c.solve(v)))
 }
 
-/// The most memory that this process had, as the system says it.
-pub fn peak_memory() -> String {
+/// The most memory that this process had, megabytes; Linux only.
+pub fn peak_memory_mb() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status
-        .lines()
-        .find(|l| l.starts_with("VmHWM"))
-        .unwrap_or_default();
-    line.split_whitespace().skip(1).collect::<Vec<_>>().join(" ")
+    let line = status.lines().find(|l| l.starts_with("VmHWM"));
+    let kilobytes = line.and_then(|l| l.split_whitespace().nth(1)?.parse::<f64>().ok());
+    kilobytes.unwrap_or(f64::NAN) / 1024.0
+}
+
+/// Lets the peak begin anew (proc(5), `clear_refs`); without effect where the system has no such file.
+pub fn reset_peak_memory() {
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
 /// Processor time of all threads of this process so far, seconds; Linux only.

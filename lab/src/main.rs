@@ -1,18 +1,13 @@
 //! Programs that produce the figures of docs/, and what tests of other languages need; README.md lists them.
 
-mod adjustment;
-mod coverage;
-mod deformation;
 mod detector;
 mod figures;
 mod projjson;
 mod sample_report;
-mod series;
-mod sharpness;
 mod speed;
-mod survey;
 mod table;
 mod words;
+mod yardstick;
 
 use words::Words;
 
@@ -22,11 +17,8 @@ type Outcome = Result<(), Box<dyn std::error::Error>>;
 /// Name and start of a program.
 type Program = (&'static str, fn(&Words) -> Outcome);
 
-const PROGRAMS: [Program; 15] = [
-    ("adjustment", adjustment::run),
-    ("coverage", coverage::run),
-    ("deformation", deformation::run),
-    ("series", series::run),
+const PROGRAMS: [Program; 12] = [
+    ("yardstick", yardstick::run),
     ("series-time", speed::series_time::run),
     ("projjson", projjson::run),
     ("kept-walls", detector::kept_walls::run),

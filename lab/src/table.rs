@@ -1,8 +1,5 @@
 //! Tables in Markdown, printed row by row: a row may take minutes.
 
-/// A column of figures about a type: its name, its decimals, and the figure.
-pub type Figure<T> = (&'static str, usize, fn(&T) -> f64);
-
 /// A table whose head is printed.
 pub struct Table(usize);
 

@@ -26,6 +26,12 @@ impl Words {
         self.0.iter().find_map(|w| w.strip_prefix(prefix))
     }
 
+    /// The word behind an option such as `--out`.
+    pub fn option(&self, option: &str) -> Option<&str> {
+        let at = self.0.iter().position(|w| w == option)?;
+        self.0.get(at + 1).map(String::as_str)
+    }
+
     /// The number behind a prefix.
     pub fn number<T: FromStr>(&self, prefix: &str) -> Option<T> {
         Some(parsed(self.after(prefix)?))
@@ -40,12 +46,6 @@ impl Words {
     pub fn list(&self, prefix: &str, default: &str) -> Vec<String> {
         let list = self.after(prefix).unwrap_or(default);
         list.split(',').map(str::to_owned).collect()
-    }
-
-    /// The names that are among the words; all where none is.
-    pub fn chosen<'a>(&self, names: &[&'a str]) -> Vec<&'a str> {
-        let some: Vec<&str> = names.iter().copied().filter(|n| self.has(n)).collect();
-        if some.is_empty() { names.to_vec() } else { some }
     }
 }
 

@@ -88,5 +88,9 @@ pub mod series;
 pub mod statistics;
 pub mod stone;
 pub mod surface;
+#[cfg(feature = "lab")]
+pub mod switches;
+#[cfg(not(feature = "lab"))]
+mod switches;
 pub mod transfer;
 pub mod views;

@@ -4,7 +4,7 @@
 //! common frame of all epochs and of the model with its answers, and the most memory of the program so far.
 
 use crate::Outcome;
-use crate::figures::{peak_memory, processor_seconds};
+use crate::figures::{peak_memory_mb, processor_seconds};
 use crate::table::Table;
 use crate::words::Words;
 use nalgebra::{Matrix3, Point3, Vector3};
@@ -46,7 +46,7 @@ pub fn run(words: &Words) -> Outcome {
             format!("{:.2}", framed - started),
             format!("{:.2}", ended - framed),
             format!("{:.1e}", (ended - started) / f64::from(stones) / count as f64),
-            peak_memory(),
+            format!("{:.0} MB", peak_memory_mb()),
         ]);
     }
 

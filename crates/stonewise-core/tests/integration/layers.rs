@@ -12,6 +12,7 @@ const LAYERS: [&[&str]; 8] = [
         "progress",
         "parallel",
         "params",
+        "switches",
     ],
     &["geometry"],
     &["raster"],

@@ -9,6 +9,7 @@ use crate::components::components;
 use crate::geometry::{DisplacementSample, SmallMotion};
 use crate::statistics::chi_square_p;
 use crate::stone::{MotionFailure, PairResult, StoneMotion};
+use crate::switches::switchable;
 use nalgebra::{Matrix3, Vector3};
 
 /// Probability that a body which moves with the wall departs from it as far by chance, below which it
@@ -53,6 +54,7 @@ pub(crate) fn bodies(adjustment: &Adjustment) -> Vec<u32> {
 /// Refuses the motions of bodies that moved unlike the largest one by far more than chance, unless photos or
 /// the agreement of their own clouds confirm them.
 pub(crate) fn refuse_unconfirmed(adjustment: &Adjustment, results: &mut [PairResult]) {
+    switchable!("bodies");
     let sample = |(i, result): (usize, &PairResult)| {
         let motion = result
             .motion

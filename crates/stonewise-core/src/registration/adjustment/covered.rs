@@ -3,6 +3,7 @@
 use super::state::{Adjustment, StoneState};
 use crate::statistics::upper_median;
 use crate::stone::{MotionFailure, PairResult};
+use crate::switches::switchable;
 use std::collections::BTreeMap;
 
 /// Mean distance of a stone's points from the joint surface, in units of the usual one, beyond which something covers
@@ -14,6 +15,7 @@ const LEAST_OF_USUAL: usize = 8;
 /// Which stones something covers in one of the epochs: ivy, snow, a net. Their points lie several times as far from the
 /// joint surface as those of other stones, and the motion would be that of what covers them.
 pub(super) fn covered(adjustment: &Adjustment) -> Vec<bool> {
+    switchable!("covered", vec![false; adjustment.stones.len()]);
     let distance = |stone: &StoneState| {
         let equations = stone.more_probable().surface.equations()?;
         Some([0, 1].map(|epoch| equations.distances[epoch] / equations.points[epoch] as f64))

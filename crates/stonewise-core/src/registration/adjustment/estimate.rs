@@ -6,6 +6,7 @@ use super::observation::NormalEquations;
 use super::solution::Solution;
 use super::state::{Adjustment, Evidence, StoneState};
 use super::stone_vector::{Matrix9, StoneVector, Vector9};
+use crate::switches::{is_on, switchable};
 use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -141,7 +142,7 @@ impl Adjustment {
         let (graph, state) = (&self.prior.graph, &solution.field.state);
         let mut sums = vec![(Vector3::zeros(), 0.0); self.stones.len()];
         for (edge, tie) in graph.edges.iter().zip(&self.prior.ties) {
-            if tie.is_parted {
+            if tie.is_parted && is_on("across") {
                 for (i, j) in [(edge.low, edge.high), (edge.high, edge.low)] {
                     let weight = self.stones[j].p_with_field;
                     sums[i].0 += (state[j].displacement() - state[i].displacement()) * weight;
@@ -220,6 +221,7 @@ pub(crate) fn by_field(equations: &NormalEquations, own: &[f64; 9]) -> Matrix9 {
 /// Stones of a larger probability than nine tenths of what intervals leave outside are followed on their own;
 /// the factor grows no further there.
 pub(crate) fn widening(p_loose: f64) -> f64 {
+    switchable!("widening", 1.0);
     let missed = p_loose.clamp(0.0, 0.9 * OUTSIDE);
     let outside = (OUTSIDE - missed) / (1.0 - missed);
     let quantile = |outside: f64| Normal::standard().inverse_cdf(1.0 - 0.5 * outside);

@@ -11,6 +11,7 @@ use super::state::{Adjustment, StoneState};
 use super::stone_vector::StoneVector;
 use super::survey::Points;
 use crate::registration::points::{PairPoints, PairSource};
+use crate::switches::{switchable, where_on};
 use rayon::prelude::*;
 
 /// What a stone's points say where it moved since the last evaluation.
@@ -56,6 +57,7 @@ impl Adjustment {
 
     /// Marks the roughness of every stone to be estimated at its next evaluation.
     pub fn mark_roughness_due(&mut self) {
+        switchable!("roughness");
         self.stones
             .iter_mut()
             .for_each(|stone| stone.is_roughness_due = true);
@@ -100,7 +102,7 @@ impl Adjustment {
         let known: Vec<(&Equations, f64)> = uncovered
             .filter_map(|s| Some((s.with_field.surface.equations()?, s.effective_freedom)))
             .collect();
-        self.surface.correlation = Correlation::of(&known);
+        self.surface.correlation = where_on("correlation", Correlation::of(&known), Correlation::NONE);
         Ok(())
     }
 
@@ -165,6 +167,7 @@ impl Adjustment {
     ///
     /// Cost: eight evaluations of these stones.
     pub fn probe<S: PairSource>(&mut self, points: &Points<S>) -> Result<(), AdjustError<S::Error>> {
+        switchable!("probe", Ok(()));
         for group in points.groups(|i| self.may_be_elsewhere(&self.stones[i])) {
             let may_be = |i: usize| self.may_be_elsewhere(&self.stones[i]);
             let found = points.of_stones(&group, may_be, |i, pair| self.probe_one(i, pair))?;

@@ -5,6 +5,7 @@ use super::state::Adjustment;
 use super::tracking::PhotoPart;
 use crate::geometry::SmallMotion;
 use crate::statistics::{UPPER_95, component_median, quantile};
+use crate::switches::switchable;
 use nalgebra::{DMatrix, Matrix3, MatrixXx3, Point3, Vector3};
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -61,6 +62,7 @@ impl Octaves {
     /// The octaves as large as the motions of stones that are not loose allow. `displacement`: of a stone in its frame.
     pub fn of(adjustment: &Adjustment, displacement: impl Fn(usize) -> Option<Vector3<f64>>) -> Self {
         let expected = Self::expected(adjustment);
+        switchable!("octaves_shown", expected);
         let free_rotation = adjustment.params.free_rotation;
         // The fitted rigid motion absorbs the longest octave, so the residuals do not show it.
         let absorbed = f64::from(u8::from(free_rotation));

@@ -18,6 +18,7 @@ use super::state::Adjustment;
 use super::stone_vector::Matrix9;
 use crate::geometry::Rigid3;
 use crate::stone::{MotionFailure, NeighbourCovariance, PairResult, StoneMotion};
+use crate::switches::is_on;
 use nalgebra::{DMatrix, Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
@@ -195,7 +196,7 @@ fn observable(motion: StoneMotion, max_sd_m: f64) -> Result<StoneMotion, MotionF
 fn reachable(adjustment: &Adjustment, i: usize, motion: StoneMotion) -> Result<StoneMotion, MotionFailure> {
     let face_from_world = &adjustment.prior.graph.nodes[i].face_from_world;
     let slid_m = (face_from_world * motion.relative).xy().norm();
-    match slid_m > ROOM_M && !adjustment.is_in_photos(i) {
+    match is_on("room") && slid_m > ROOM_M && !adjustment.is_in_photos(i) {
         true => Err(MotionFailure::Disagreement),
         false => Ok(motion),
     }
@@ -232,7 +233,7 @@ fn shows_two_surfaces(equations: &Equations, inflation: f64, share: f64) -> bool
     let cells = equations.differences.len() as f64;
     let limit = BAD_CELL * inflation;
     let bad = equations.differences.iter().filter(|d| **d > limit).count();
-    bad >= BAD_CELLS && bad as f64 / cells.max(1.0) > share
+    is_on("two_surfaces") && bad >= BAD_CELLS && bad as f64 / cells.max(1.0) > share
 }
 
 /// `shared`: variances of errors that all points of a stone share; those of the translation come from the octaves.

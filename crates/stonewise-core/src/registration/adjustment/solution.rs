@@ -10,6 +10,7 @@ use super::observation::NormalEquations;
 use super::partial_view::estimated_rate;
 use super::state::{Adjustment, Evidence, StoneState};
 use crate::progress::{Interrupted, Progress};
+use crate::switches::switchable;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -167,6 +168,7 @@ impl Adjustment {
     /// The points alone decide: all stones of a side share the errors of their photos' poses, so that no number
     /// of them proves a jump.
     pub fn add_crack(&mut self, solution: &Solution) -> bool {
+        switchable!("crack", false);
         let photos = self.photos.as_ref();
         let of_clouds = photos.map(|_| self.cloud_equations(self.prior.components.error_m));
         let problem = match &of_clouds {
@@ -182,6 +184,7 @@ impl Adjustment {
 
     /// Finds a zone that creeps and lets its motion change as its stones show; whether there is one.
     pub fn loosen_zone(&mut self, solution: &Solution) -> bool {
+        switchable!("zone", false);
         let equations = self.without_error();
         let left_over = self.left_over(solution);
         let Some((stones, least)) = creeping_zone(&self.likelihood(&equations), &left_over) else {

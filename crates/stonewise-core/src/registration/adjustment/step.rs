@@ -6,6 +6,7 @@ use super::field::{Field, Posterior, posterior};
 use super::solution::Solution;
 use super::state::Adjustment;
 use super::stone_vector::StoneVector;
+use crate::switches::is_on;
 use rayon::prelude::*;
 
 /// One stone in this many may still swing between two optima of its own when the adjustment has settled.
@@ -44,7 +45,7 @@ impl Adjustment {
             let with_field = limits.follow(&mut self.stones[i].with_field, tied, &origin, p);
             let on_own = self.step_on_own(i, &solution.equations[i], &solution.field);
             restless += usize::from(with_field.counts) + usize::from(on_own.counts);
-            self.stones[i].swings = with_field.swings || on_own.swings;
+            self.stones[i].swings = is_on("swings") && (with_field.swings || on_own.swings);
             self.stones[i].moves = with_field.moves || on_own.moves;
         }
         restless * RESTLESS <= self.stones.len()

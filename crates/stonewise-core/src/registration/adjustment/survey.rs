@@ -8,6 +8,7 @@ use crate::id::StoneId;
 use crate::progress::{Interrupted, Progress, ahead};
 use crate::registration::points::{NOISES_ALIKE, PairPoints, PairSource, Window, face_spacing};
 use crate::statistics::{component_median, upper_median};
+use crate::switches::{switchable, where_on};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -144,7 +145,7 @@ pub(crate) fn survey<'a, S: PairSource>(
         .map(|w| w.as_deref().map_or(1.0, Window::shared))
         .collect();
     for (stone, hidden) in stones.iter_mut().zip(hidden(&shared)) {
-        stone.hidden = hidden.max(missing(stone.counts));
+        stone.hidden = where_on("partial", hidden.max(missing(stone.counts)), 0.0);
     }
     sample.retain(|(i, _)| stones[*i].noise_factors == [1.0; 2]);
     let keep = sample.len().div_ceil(SAMPLE).max(1);
@@ -190,6 +191,7 @@ fn shares(window: &Window) -> [Vec<(u32, f64)>; 2] {
 /// Compares the noise of stones that sources of another sensor measured with that of most stones: sources whose
 /// stones mostly have another noise.
 fn set_noise_factors(stones: &mut [StoneInfo], windows: &[Option<Arc<Window>>]) {
+    switchable!("sensors");
     for epoch in 0..2 {
         let mut all: Vec<f64> = windows.iter().flatten().map(|w| w.noise_m()[epoch]).collect();
         let Some(usual) = upper_median(&mut all).filter(|usual| *usual > 0.0) else {

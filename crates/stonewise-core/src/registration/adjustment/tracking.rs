@@ -14,6 +14,7 @@ use super::survey::Points;
 use crate::registration::photos::{FaceMotion, PhotoSource, PhotoStatus, Track, Tracker};
 use crate::registration::points::{PairPoints, PairSource};
 use crate::stone::PairResult;
+use crate::switches::switchable;
 use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
 
@@ -223,6 +224,7 @@ impl Adjustment {
     /// what passes for an error of the clouds may be a slide, and so may what passes for an appearance bias;
     /// it is both where both are there.
     pub fn undetected_slide_m(&self, i: usize) -> f64 {
+        switchable!("slide", 0.0);
         let error_m = self.prior.components.error_m;
         match self.photos.as_ref().and_then(|p| p.stone(i)) {
             Some(photos) => {

@@ -3,6 +3,7 @@
 use super::components::{ObserverComponents, SensorClass};
 use super::model::{Prior, Problem, Unknowns};
 use super::observation::Observation;
+use crate::switches::switchable;
 use nalgebra::{Matrix3, Vector3};
 
 /// Factor on the error of the whole epoch where areas alone are to determine it. With it left open,
@@ -43,6 +44,7 @@ impl Model {
     /// assumed: an assumption that does not hold would pull the error towards none. Along what the areas show worse
     /// than it is assumed, the assumption holds: no area makes the expected error larger.
     pub fn widened(self, unknowns: &Unknowns, observations: &[&Observation]) -> Self {
+        switchable!("obs_widened", self);
         let (prior, components) = self.opened();
         let Some(solution) = Problem::new(unknowns, observations).solve(&prior, &components) else {
             return self;

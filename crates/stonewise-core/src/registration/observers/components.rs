@@ -1,5 +1,6 @@
 //! Variances of the sources' errors: what they are, and what is expected of them beforehand.
 
+use crate::switches::switchable;
 use serde::{Deserialize, Serialize};
 
 /// Standard deviations of the sources' errors and of what compares them.
@@ -67,6 +68,7 @@ impl SensorClass {
     /// Prior of the stretch about the middle of what a source sees; `None` where a source sees all places from
     /// the same direction.
     pub(super) fn stretch(self) -> Option<Stretch> {
+        switchable!("obs_stretch", None);
         match self {
             Self::Terrestrial => Some(Stretch {
                 shared: 1e-4,

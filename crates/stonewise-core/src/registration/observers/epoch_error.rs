@@ -18,6 +18,7 @@ use super::sensors::Sharpest;
 use super::sight::{SeenStone, Sight, Source};
 use super::stable::stable_observations;
 use crate::progress::{Interrupted, Progress};
+use crate::switches::{switchable, where_on};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -329,6 +330,7 @@ fn estimated(
 /// Takes the weight off stones that are far off whatever rigid errors the sources have, so that they do not make the
 /// variances large.
 fn leave_out_gross(unknowns: &Unknowns, within: &mut [Vec<Observation>; 2], expected: &ObserverComponents) {
+    switchable!("obs_gross");
     let prior = Prior::new(&opened(*expected), 0.0);
     for _ in 0..GROSS_ROUNDS {
         let all: Vec<&Observation> = within.iter().flatten().collect();
@@ -365,6 +367,7 @@ impl Averaged {
     fn new(unknowns: &Unknowns, observations: &[&Observation], model: &Model) -> Self {
         let problem = Problem::new(unknowns, observations);
         let deviances: Vec<(f64, f64)> = FACTORS
+            .map(|f| where_on("obs_average", f, 0.0))
             .par_iter()
             .filter_map(|log| {
                 let (prior, components) = model.scaled(log.exp());

@@ -5,6 +5,7 @@ use super::observation::Observation;
 use super::sight::{Sight, Source, StablePlane, Target};
 use crate::linalg::DenseFactor;
 use crate::statistics::upper_median;
+use crate::switches::where_on;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Point3, Vector3};
 use std::collections::BTreeMap;
 
@@ -83,7 +84,7 @@ impl Prior {
         Self {
             translation_m: components.translation_m,
             rotation_m: components.rotation_m,
-            drift_m: components.drift_m,
+            drift_m: where_on("obs_drift", components.drift_m, 1e-6),
             drift_length: components.drift_length,
             whole,
             plane_m,

@@ -4,6 +4,7 @@ use super::graph::Graph;
 use super::prior::{Least, Tie, of_tie, tie_blocks};
 use super::solve::Field;
 use super::variance_components::{BOUNDS, VarianceComponents};
+use crate::switches::where_on;
 use rayon::prelude::*;
 
 /// A drift so large that a tie of it says nothing, per square root metre.
@@ -30,7 +31,7 @@ pub(crate) fn reweight_ties(
             tie.weight = 1.0;
             continue;
         }
-        tie.weight = (freedom + 9.0 * share) / (freedom + s[0] + s[1]);
+        tie.weight = where_on("tie_t", (freedom + 9.0 * share) / (freedom + s[0] + s[1]), 1.0);
         sums[0] += tie.weight * s[0] / (6.0 * share);
         sums[1] += tie.weight * s[1] / (3.0 * share);
         sums[2] += tie.weight;

@@ -1,5 +1,6 @@
 //! The variance components of the adjustment.
 
+use crate::switches::where_on;
 use serde::{Deserialize, Serialize};
 
 /// How unlike neighbouring stones may move: standard deviations, estimated from the survey itself.
@@ -124,7 +125,12 @@ impl VarianceComponents {
 
     /// Variances of a stone's own (translation, rotation, bending) in its frame.
     pub(crate) fn own_variances(&self) -> [f64; 9] {
-        let (i, o, r, b) = (NONE_M, self.own_m, self.own_rad, self.bending_per_m);
+        let (i, o, r, b) = (
+            NONE_M,
+            self.own_m,
+            self.own_rad,
+            where_on("bending", self.bending_per_m, 1e-6),
+        );
         [i, i, o, r, r, r, b, b, b].map(|s| s * s)
     }
 

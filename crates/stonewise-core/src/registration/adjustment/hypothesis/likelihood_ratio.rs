@@ -8,6 +8,7 @@
 use crate::registration::adjustment::observation::surface::{Layout, LocalPair, SurfaceNoise, deviance};
 use crate::registration::adjustment::stone_vector::StoneVector;
 use crate::statistics::upper_median;
+use crate::switches::is_on;
 
 /// Log of the odds, 20, at which half of a stone contradicts a motion.
 const CONTRADICTION: f64 = 3.0;
@@ -66,7 +67,7 @@ impl LikelihoodRatioTest<'_> {
             least: self.least_half(),
             at,
         };
-        let halves = (log_ratio > limit).then(|| known.copied().unwrap_or_else(test));
+        let halves = (log_ratio > limit && is_on("halves")).then(|| known.copied().unwrap_or_else(test));
         LikelihoodRatio {
             log_ratio,
             is_contradicted: halves.is_some_and(|halves| halves.least < -limit),

@@ -6,6 +6,7 @@
 
 use crate::registration::adjustment::observation::surface::equations::Equations;
 use crate::statistics::upper_median;
+use crate::switches::switchable;
 
 /// Cells that a stone needs to be judged: twice the unknowns that its own points determine at most.
 const CELLS: usize = 10;
@@ -64,6 +65,7 @@ impl Correlation {
 ///
 /// Only small cells are compared, with those of most stones: the survey's factor may be that of the larger ones.
 pub(crate) fn stone_factor(stone: &Equations, fitted: f64, survey: &Correlation) -> f64 {
+    switchable!("stone_factor", 1.0);
     let cells = stone.differences.len() as f64;
     let ratios = stone.differences.iter().map(|d| (d / survey.small).min(CAP));
     let sum: f64 = ratios.sum();
@@ -72,6 +74,7 @@ pub(crate) fn stone_factor(stone: &Equations, fitted: f64, survey: &Correlation)
 
 /// Factor on the variances of one stone's motion in the face, for the survey's factor on them; at least 1.
 pub(crate) fn stone_slope_factor(stone: &Equations, survey: f64) -> f64 {
+    switchable!("slopes", 1.0);
     let freedom = slope_freedom(stone);
     let ratio = slope_ratio(stone).min(CAP * survey);
     ((PRIOR_CELLS * survey + freedom * ratio) / (PRIOR_CELLS + freedom)).max(1.0)
@@ -84,6 +87,7 @@ pub(crate) fn stone_slope_factor(stone: &Equations, survey: f64) -> f64 {
 /// length, as errors of stereo matching and drifting scan lines do, and so to be there at the size of a stone
 /// too, and at that of the wall.
 pub(crate) fn shared_variance(stones: &[&Equations], correlation: &Correlation) -> f64 {
+    switchable!("shared", 0.0);
     let mut variances: Vec<f64> = stones
         .iter()
         .flat_map(|e| e.coarse_variances.iter().copied())

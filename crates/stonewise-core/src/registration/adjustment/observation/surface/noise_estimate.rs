@@ -10,6 +10,7 @@ use super::robust::robust_fit;
 use super::surface_noise::SurfaceNoise;
 use crate::registration::adjustment::stone_vector::StoneVector;
 use crate::statistics::upper_median;
+use crate::switches::switchable;
 use rayon::prelude::*;
 
 /// Patches that the estimate uses at most; more do not move it by a percent.
@@ -124,6 +125,7 @@ fn sampled(sample: &[(&LocalPair, StoneVector)], noise: &SurfaceNoise, layout: &
 
 /// The patches whose points scatter about the surface of both epochs like those of the others.
 fn without_foreign(patches: Vec<PatchPoints>, noise: &SurfaceNoise, layout: &Layout) -> Vec<PatchPoints> {
+    switchable!("foreign", patches);
     let scatters: Vec<[f64; 2]> = patches.par_iter().map(|p| scatter(p, noise, layout)).collect();
     let limits = [0, 1].map(|epoch| {
         let mut all: Vec<f64> = scatters.iter().map(|s| s[epoch]).collect();

@@ -11,11 +11,12 @@ use stonewise_core::registration::observers::{SeenStone, SourcePoints};
 use stonewise_core::registration::{NearPoint, PairPoints, local_shifts, stone_points};
 
 /// Points that a stone needs in each epoch.
-pub const LEAST_POINTS: usize = 10;
+const LEAST_POINTS: usize = 10;
 /// Around a stone, metres: points of others at its border.
 const AROUND_M: f64 = 0.02;
 
 /// A measured point.
+#[derive(Clone, Copy)]
 pub struct SurveyPoint {
     pub place: Point3<f64>,
     /// Station or strip, as the survey numbers them.
@@ -25,23 +26,16 @@ pub struct SurveyPoint {
 
 /// Points by stone; 0 holds what is no stone.
 pub type Points = BTreeMap<u32, Vec<SurveyPoint>>;
-/// Points by stone without sources and times, world frame, metres.
-pub type Places = BTreeMap<u32, Vec<Point3<f64>>>;
-
-/// The places of these stones.
-pub fn places(points: &Points, stones: &[u32]) -> Places {
-    let of = |id: &u32| (*id, points[id].iter().map(|p| p.place).collect());
-    stones.iter().map(of).collect()
-}
 
 /// Centre of gravity.
-pub fn mean(points: &[Point3<f64>]) -> Point3<f64> {
-    (points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64).into()
+pub fn mean(points: &[SurveyPoint]) -> Point3<f64> {
+    (points.iter().map(|p| p.place.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64).into()
 }
 
 /// Normal of the plane through points, on the side of `outward`.
-pub fn face_normal(points: &[Point3<f64>], outward: &Vector3<f64>) -> Option<Vector3<f64>> {
-    let normal = Plane::fit(points)?.normal;
+pub fn face_normal(points: &[SurveyPoint], outward: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let places: Vec<Point3<f64>> = points.iter().map(|p| p.place).collect();
+    let normal = Plane::fit(&places)?.normal;
     Some(normal * normal.dot(outward).signum())
 }
 
@@ -50,7 +44,7 @@ pub fn face_normal(points: &[Point3<f64>], outward: &Vector3<f64>) -> Option<Vec
 /// `outward`: roughly the normal of a stone; `None` leaves it out. Near the border of a stone points are chosen
 /// as in a run, within `border_noises` noise levels.
 pub fn pairs(
-    epochs: &[Places; 2],
+    epochs: &[Points; 2],
     outward: impl Fn(u32) -> Option<Vector3<f64>> + Sync,
     border_noises: f64,
 ) -> Vec<PairPoints> {
@@ -98,14 +92,16 @@ pub fn pairs(
 
 /// Points in and around stones.
 struct Surroundings<'a> {
-    epochs: &'a [Places; 2],
+    epochs: &'a [Points; 2],
     bounds: [BTreeMap<u32, Bounds>; 2],
 }
 
 impl<'a> Surroundings<'a> {
-    fn new(epochs: &'a [Places; 2]) -> Self {
+    fn new(epochs: &'a [Points; 2]) -> Self {
         let bounds = epochs.each_ref().map(|stones| {
-            let of = |(id, points): (&u32, &Vec<_>)| Some((*id, Bounds::of(points.iter().copied())?));
+            let of = |(id, points): (&u32, &Vec<SurveyPoint>)| {
+                Some((*id, Bounds::of(points.iter().map(|p| p.place))?))
+            };
             stones.iter().filter_map(of).collect()
         });
         Self { epochs, bounds }
@@ -118,11 +114,11 @@ impl<'a> Surroundings<'a> {
             .iter()
             .filter(|(k, _)| **k == id || self.bounds[epoch][*k].intersects(&place))
             .flat_map(|(k, points)| points.iter().map(move |p| (*k == id, p)))
-            .filter(|(own, p)| *own || place.contains(p))
+            .filter(|(own, p)| *own || place.contains(&p.place))
             .map(|(labelled, p)| NearPoint {
-                offset: (p - centroid).cast::<f32>().into(),
+                offset: (p.place - centroid).cast::<f32>().into(),
                 labelled,
-                source: 0,
+                source: p.source as u32,
             })
             .collect()
     }
@@ -135,8 +131,8 @@ pub fn seen_stone(
     outward: &Vector3<f64>,
     number: impl Fn(usize, usize) -> usize,
 ) -> Option<SeenStone> {
-    let first: Vec<Point3<f64>> = epochs[0][&id].iter().map(|p| p.place).collect();
-    let centroid = mean(&first);
+    let first = &epochs[0][&id];
+    let centroid = mean(first);
     let mut sights: BTreeMap<usize, Vec<&SurveyPoint>> = BTreeMap::new();
     for (epoch, points) in epochs.iter().enumerate() {
         for p in &points[&id] {
@@ -151,7 +147,7 @@ pub fn seen_stone(
     };
     Some(SeenStone {
         centroid,
-        normal: face_normal(&first, outward)?,
+        normal: face_normal(first, outward)?,
         sights: sights.into_iter().map(sight).collect(),
     })
 }

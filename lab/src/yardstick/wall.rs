@@ -1,0 +1,240 @@
+//! A wall of which all is known: what its stones did, and what the sources of both epochs measured.
+
+use super::event::Event;
+use super::photos::PhotoErrors;
+use super::points::{Points, SurveyPoint};
+use nalgebra::{Point3, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeMap;
+use stonewise_core::geometry::Rigid3;
+use stonewise_core::progress::Silent;
+use stonewise_simulate::{
+    FacePoint, Scan, SceneParams, SeenCells, Sensor, StripDrift, TlsParams, UavParams, WallMotion,
+    WallParams, Window, World, scan_window, stone_truths,
+};
+
+/// Share of a face that must be seen in both epochs for the stone to count.
+const LEAST_SEEN: f64 = 0.35;
+
+/// What is true of a stone; world, metres.
+#[derive(Clone, Debug)]
+pub struct Truth {
+    /// Roughly the outward normal of the face.
+    pub normal: Vector3<f64>,
+    /// `p2 = motion * p1`.
+    pub motion: Rigid3,
+    /// The displacement that it shares with its neighbours.
+    pub shared: Vector3<f64>,
+    pub is_loose: bool,
+    /// Whole, seen well enough in both epochs, and its masks are right. Other stones count only where they are
+    /// grossly wrong.
+    pub is_countable: bool,
+    /// Its mask or its partner in one epoch is another stone's: no motion is the right answer.
+    pub is_odd: bool,
+}
+
+impl Truth {
+    pub fn is_still(&self) -> bool {
+        self.motion == Rigid3::identity()
+    }
+
+    pub fn displacement(&self, place: &Point3<f64>) -> Vector3<f64> {
+        self.motion * place - place
+    }
+}
+
+/// A part of the wall that truly deformed: its middle, and its largest motion, metres.
+#[derive(Clone, Copy, Debug)]
+pub struct Area {
+    pub middle: Point3<f64>,
+    pub largest_m: f64,
+}
+
+/// Both epochs with their truth.
+#[derive(Clone, Default)]
+pub struct Wall {
+    /// By stone of the first epoch; 0 holds what is no stone.
+    pub epochs: [Points; 2],
+    pub truth: BTreeMap<u32, Truth>,
+    pub areas: Vec<Area>,
+    /// Whether nothing moved but what the areas hold, and single stones.
+    pub is_still_elsewhere: bool,
+    /// Whether no stone of the wall moved.
+    pub is_still: bool,
+    pub has_times: [bool; 2],
+    /// Whether what stands before the wall is named as stable.
+    pub has_stable: bool,
+}
+
+/// What measures an epoch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Instrument {
+    /// Scanner, with this many stations.
+    Scanner(u32),
+    /// Lidar under a drone, with this many strips.
+    Drone(u32),
+    /// Dense matching of photos whose principal points differ from photo to photo. `is_joint`: whether one bundle
+    /// adjusts the photos of both epochs.
+    Photos { is_joint: bool },
+}
+
+/// What the sources of an epoch get wrong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fault {
+    /// What is assumed of the sensor, no more.
+    Usual,
+    /// The sources of an epoch share no error, or twice what is assumed.
+    Shared(f64),
+    /// How strips drift.
+    Drift(StripDrift),
+    /// Software has adjusted the strips to each other.
+    Adjusted,
+    /// Ranges of a station are too long by a factor (sd).
+    Scale(f64),
+    /// Ranges are too long where a beam grazes the wall, and where it is dark, metres.
+    Surface(f64),
+}
+
+/// How a survey is made.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    pub instruments: [Instrument; 2],
+    pub size_m: [f64; 2],
+    pub motions: Vec<WallMotion>,
+    pub events: Vec<Event>,
+    pub fault: Fault,
+    pub has_stable: bool,
+}
+
+impl Plan {
+    /// The survey of this plan. `seed`: of stones, motions and errors.
+    pub fn make(&self, seed: u64) -> Wall {
+        self.make_later(seed, 1)
+    }
+
+    /// The same whose second epoch is this one of a series, with errors of its own.
+    pub fn make_later(&self, seed: u64, later: usize) -> Wall {
+        let params = self.params().seeded(seed);
+        let world = World::new(&params);
+        let truths = stone_truths(&world, &Silent).unwrap();
+        let scans = [0, 1].map(|epoch| {
+            let sensor = match self.instruments[epoch] {
+                Instrument::Drone(_) => Sensor::Uav,
+                Instrument::Scanner(_) | Instrument::Photos { .. } => Sensor::Tls,
+            };
+            let number = epoch * later;
+            scan_window(&world.scene(epoch), &params, sensor, number, &Window::whole()).unwrap()
+        });
+        let seen = [0, 1].map(|epoch| {
+            let mut cells = SeenCells::new(&world, epoch);
+            cells.add(&scans[epoch]);
+            cells.shares(&truths)
+        });
+        let truth = truths.iter().enumerate().map(|(k, truth)| {
+            let of_stone = Truth {
+                normal: truth.normal,
+                motion: world.motions[k].second_from_first,
+                shared: truth.shared,
+                is_loose: truth.loose,
+                is_countable: !truth.edge && seen.iter().all(|s| s[k] >= LEAST_SEEN),
+                is_odd: false,
+            };
+            (truth.id.0, of_stone)
+        });
+        let area = |motion: &WallMotion| {
+            let (centre, largest_m) = match motion {
+                WallMotion::Bulge {
+                    centre_m, depth_m, ..
+                } => (centre_m, depth_m.abs()),
+                WallMotion::Zone { centre_m, d_m, .. } => (centre_m, Vector3::from(*d_m).norm()),
+                _ => return None,
+            };
+            let [a, u] = *centre;
+            let middle = world.wall.face.world_of(&FacePoint { a, u, n: 0.0 });
+            Some(Area { middle, largest_m })
+        };
+        let photos = PhotoErrors::new(self.instruments, self.size_m, seed);
+        let mut wall = Wall {
+            epochs: [0, 1].map(|epoch| match self.instruments[epoch] {
+                Instrument::Photos { .. } => photos.measured(&scans[epoch], epoch),
+                _ => measured(&scans[epoch]),
+            }),
+            truth: truth.collect(),
+            areas: self.motions.iter().filter_map(area).collect(),
+            is_still_elsewhere: self.motions.iter().all(|m| {
+                matches!(
+                    m,
+                    WallMotion::Bulge { .. } | WallMotion::Zone { .. } | WallMotion::Loose { .. }
+                )
+            }),
+            is_still: self.motions.is_empty(),
+            has_times: self.instruments.map(|i| !matches!(i, Instrument::Photos { .. })),
+            has_stable: self.has_stable,
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0xe7e7);
+        for event in &self.events {
+            event.happen(&mut wall, &mut rng);
+        }
+        wall
+    }
+
+    fn params(&self) -> SceneParams {
+        let [of_scanner, of_drone] = self.instruments.iter().fold([0, 0], |[s, d], i| match i {
+            Instrument::Scanner(count) => [*count, d],
+            Instrument::Drone(count) => [s, *count],
+            Instrument::Photos { .. } => [3, d],
+        });
+        let mut tls = TlsParams {
+            stations: of_scanner,
+            // On long walls a station sees its part, from farther away.
+            reach_m: if self.size_m[0] > 10.0 { 12.0 } else { 0.0 },
+            registration_m: 4e-4,
+            datum_m: 3e-4,
+            spacing_m: 0.007,
+            ..TlsParams::default()
+        };
+        let mut uav = UavParams {
+            strips: of_drone,
+            datum_m: 2e-3,
+            drift_m: 3e-3,
+            spacing_m: 0.012,
+            ..UavParams::default()
+        };
+        match self.fault {
+            Fault::Usual => (),
+            Fault::Shared(factor) => {
+                tls.datum_m *= factor;
+                uav.datum_m *= factor;
+            }
+            Fault::Drift(drift) => uav.drift = drift,
+            Fault::Adjusted => uav.adjusted = true,
+            Fault::Scale(sd) => tls.scale_error = sd,
+            Fault::Surface(error_m) => {
+                for beam in [&mut tls.beam, &mut uav.beam] {
+                    (beam.incidence_m, beam.darkness_m) = (error_m, 0.25 * error_m);
+                }
+            }
+        }
+        SceneParams {
+            wall: WallParams::sized(self.size_m),
+            motions: self.motions.clone(),
+            tls: (of_scanner > 0).then_some(tls),
+            uav: (of_drone > 0).then_some(uav),
+            ..SceneParams::default()
+        }
+    }
+}
+
+/// The points of a scan by stone, as they were measured.
+fn measured(scan: &Scan) -> Points {
+    let mut points = Points::new();
+    for (i, &stone) in scan.stone.iter().enumerate() {
+        points.entry(stone).or_default().push(SurveyPoint {
+            place: scan.cloud.world(i),
+            source: scan.source[i] as usize,
+            time_s: scan.time[i],
+        });
+    }
+    points
+}
