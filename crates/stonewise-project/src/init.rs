@@ -5,7 +5,7 @@ mod listing;
 mod order;
 
 use epoch::{CLOUDS, Found, MASKS, look, scans_beside};
-use listing::{files, folders, has_extension, is_made_by_stonewise, name};
+use listing::{files, folders, is_made_by_stonewise, name};
 use order::order;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

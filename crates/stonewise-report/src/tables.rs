@@ -6,7 +6,7 @@ use stonewise_base::error::Error;
 use stonewise_core::series::{Departure, Word};
 use stonewise_io::table::{Table, TableError, write_csv};
 use stonewise_results::records::{
-    AnswerVerdict, DeformedZone, EpochVerdict, RunRecord, SeriesVerdict, TrendsRecord, ZoneTrend,
+    AnswerVerdict, DeformedZone, EpochVerdict, RunRecord, SeriesVerdict, TrendsRecord,
 };
 use stonewise_results::{Joint, JointMotion, ResultSet, joints};
 

@@ -115,7 +115,8 @@ fn coloured_points_come_back_with_their_numbers_and_system() {
     let mut reader = Reader::from_path(&path).unwrap();
     assert_eq!(cloud_info(&path).unwrap().crs.as_deref(), Some(wkt));
     let mut read = 0;
-    for (i, point) in reader.points().map(Result::unwrap).enumerate() {
+    let written = reader.read_all().unwrap();
+    for (i, point) in written.points().map(Result::unwrap).enumerate() {
         assert!((Point3::new(point.x, point.y, point.z) - points[i]).amax() < 0.51e-4);
         let colour = point.color.unwrap();
         assert_eq!(

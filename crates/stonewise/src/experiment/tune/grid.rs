@@ -85,7 +85,7 @@ pub(super) fn points(grid: &[Dimension]) -> Vec<Vec<toml::Value>> {
         let longer = |point: &Vec<toml::Value>| {
             let values = dimension.values.iter();
             values
-                .map(|v| [point.as_slice(), &[v.clone()]].concat())
+                .map(|v| [point.as_slice(), std::slice::from_ref(v)].concat())
                 .collect::<Vec<_>>()
         };
         points.iter().flat_map(longer).collect()
