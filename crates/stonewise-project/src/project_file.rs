@@ -35,6 +35,21 @@ use toml::value::Datetime;
 
 /// What to do about backslashes.
 const SLASHES: &str = "use / or single quotes in paths";
+/// Keys that are gone, as the reader of TOML names them, and what to do instead.
+const GONE_KEYS: [(&str, &str); 3] = [
+    (
+        "unknown field `start`, expected one of `buffer_m`",
+        "the iteration starts at no motion, as in the paper; raise max_distance_m where stones move farther",
+    ),
+    (
+        "unknown field `plane_radius_m`, expected one of `buffer_m`",
+        "raise plane_neighbours instead",
+    ),
+    (
+        "unknown field `tolerance_rad`, expected one of `buffer_m`",
+        "tolerance_m limits what a step moves any point by, turns included",
+    ),
+];
 
 /// A project file of stonewise: which surveys, and the parameters of every step.
 #[derive(Deserialize, JsonSchema)]
@@ -570,7 +585,10 @@ impl Source<'_> {
                 format!(": write it as a list: {} = [{}]", key.trim(), value.trim())
             }
             _ if message.contains("escape") => format!(": {SLASHES}"),
-            _ => String::new(),
+            _ => {
+                let gone = GONE_KEYS.iter().find(|(unknown, _)| message.starts_with(unknown));
+                gone.map_or(String::new(), |(_, fix)| format!(": {fix}"))
+            }
         };
         self.error(span, message + &fix)
     }

@@ -126,6 +126,14 @@ fn hostile_values_are_refused_with_their_line() {
         ),
         ("[match]\nmutual = 1 # here", "expected a boolean"),
         ("[match]\nmax_ration = 0.5 # here", "unknown field `max_ration`"),
+        (
+            "[registration.gicp]\nstart = \"centroids\" # here",
+            "the iteration starts at no motion",
+        ),
+        (
+            "[registration.gicp]\nplane_radius_m = 0.1 # here",
+            "raise plane_neighbours",
+        ),
         ("[matching] # here\nmax_ratio = 0.5", "unknown field `matching`"),
         (
             "[registration]\nestimator = \"network\" # here",

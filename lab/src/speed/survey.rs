@@ -103,7 +103,6 @@ impl Windows {
             first: StoneId(id),
             second: StoneId(id),
             centroid,
-            centroid_second: centroid,
             points: indices(&near[0], &centroid),
             points_second: indices(&near[1], &centroid).len(),
         };

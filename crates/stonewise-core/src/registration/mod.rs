@@ -20,7 +20,7 @@ pub use adjustment::{
 pub use deformation::{
     Deformation, DeformationZone, StoneDeformation, ZONE_EXTENTS_M, ZoneKind, deformation,
 };
-pub use gicp::{GicpBlock, GicpParams, GicpStart, GicpStone, align, relate_to_neighbours};
+pub use gicp::{GicpBlock, GicpParams, GicpStone, align, relate_to_neighbours};
 pub use moved::moved_stones;
 pub use points::{
     MatchedPair, MemoryPairs, NearPoint, PairPlaces, PairPoints, PairSource, StoneExtents, StonePoints,

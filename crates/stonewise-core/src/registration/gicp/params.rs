@@ -4,17 +4,6 @@ use crate::params::{Params, Range, Ranged, with_ranges};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Where the iteration starts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum GicpStart {
-    /// At no motion, as in the paper.
-    #[default]
-    Identity,
-    /// At the difference of the stone's centroids: for motions larger than the relief of the stones.
-    Centroids,
-}
-
 /// Parameters of [`super::align`] and [`super::relate_to_neighbours`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -23,8 +12,6 @@ pub struct GicpParams {
     /// Points within this distance of any point of the stone take part, metres. 0.6 as in the paper; 0 leaves
     /// the stone's own points.
     pub buffer_m: f64,
-    /// Where the iteration starts. `identity` as in the paper.
-    pub start: GicpStart,
     /// Points further apart do not correspond, metres. 0.1 is twice the largest motion of the paper's
     /// experiment.
     pub max_distance_m: f64,
@@ -34,16 +21,11 @@ pub struct GicpParams {
     /// Neighbours to which the plane of a point is fitted, itself included. 20 as in Segal, Haehnel & Thrun
     /// (2009).
     pub plane_neighbours: usize,
-    /// All points within this radius are used for the plane too, metres; noisy clouds need more than their
-    /// nearest points. 0: the nearest alone, as in the source.
-    pub plane_radius_m: f64,
     /// Variance across a plane relative to the variance along it. 1e-3 as in Segal, Haehnel & Thrun (2009).
     pub plane_epsilon: f64,
-    /// A step below this, together with `tolerance_rad`, ends the iteration, metres. 1e-6: the millimetre
-    /// that is common elsewhere biases the answer by half a millimetre.
+    /// A step that moves no point by more than this ends the iteration, metres. 1e-6: the millimetre that is
+    /// common elsewhere biases the answer by half a millimetre.
     pub tolerance_m: f64,
-    /// A rotation below this ends the iteration, radians. 1e-7 is a tenth of `tolerance_m` on a metre.
-    pub tolerance_rad: f64,
     /// Most iterations. On smooth faces steps along the face shrink slowly; rough
     /// masonry needs less than half of 400.
     pub max_iterations: usize,
@@ -67,14 +49,11 @@ impl Default for GicpParams {
     fn default() -> Self {
         Self {
             buffer_m: 0.6,
-            start: GicpStart::Identity,
             max_distance_m: 0.1,
             voxel_m: 0.0,
             plane_neighbours: 20,
-            plane_radius_m: 0.0,
             plane_epsilon: 1e-3,
             tolerance_m: 1e-6,
-            tolerance_rad: 1e-7,
             max_iterations: 400,
             min_points: 25,
             min_overlap: 0.3,
@@ -93,10 +72,8 @@ impl Params for GicpParams {
             Range::POSITIVE.holds("max_distance_m", self.max_distance_m),
             Range::NOT_NEGATIVE.holds("voxel_m", self.voxel_m),
             Range::POSITIVE.holds("plane_neighbours", self.plane_neighbours),
-            Range::NOT_NEGATIVE.holds("plane_radius_m", self.plane_radius_m),
             Range::POSITIVE.holds("plane_epsilon", self.plane_epsilon),
             Range::POSITIVE.holds("tolerance_m", self.tolerance_m),
-            Range::NOT_NEGATIVE.holds("tolerance_rad", self.tolerance_rad),
             Range::POSITIVE.holds("max_iterations", self.max_iterations),
             Range::NOT_NEGATIVE.holds("min_points", self.min_points),
             Range::SHARE.holds("min_overlap", self.min_overlap),

@@ -1,171 +1,124 @@
-//! The window of a stone: the points that are aligned, and their partners under a motion.
+//! The window of a stone: the points that are aligned, and the motion that brings them onto their partners.
 
+use super::align::GicpStone;
 use super::block::GicpBlock;
-use super::pairing::Partner;
+use super::params::GicpParams;
 use crate::cloud::GridIndex;
+use crate::geometry::{Rigid3, lever};
+use crate::stone::MotionFailure;
 use nalgebra::{Matrix3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
 
-/// Points of a stone that are compared first.
-const FEW: usize = 64;
+/// Factor by which a damped step grows back in each iteration that does not turn back: slow, as partners on
+/// the edge of a jump would set off the next swing.
+const RECOVERY: f64 = 1.02;
 
-/// A point of the window: its arm from the centroid and its normal, both in the first epoch.
-pub(super) struct WindowPoint {
-    pub arm: Vector3<f64>,
-    pub normal: Vector3<f64>,
-    pub partner: Partner,
-}
+/// Smallest cell in which the points of a stone are sought, metres.
+const SHAPE_CELL_M: f64 = 0.01;
 
-/// A rigid motion about the centroid.
-#[derive(Clone, Copy)]
-pub(super) struct Motion {
-    pub shift: Vector3<f64>,
-    pub turn: UnitQuaternion<f64>,
-}
-
-impl Motion {
-    /// This motion and a small step (displacement, rotation) after it.
-    pub fn after(&self, step: &Vector6<f64>) -> Self {
-        let turn = step.fixed_rows::<3>(3).into_owned();
-        Self {
-            shift: self.shift + step.fixed_rows::<3>(0),
-            turn: UnitQuaternion::from_scaled_axis(turn) * self.turn,
-        }
-    }
+/// The points around a stone, to be moved onto the second epoch.
+pub(super) struct Window<'a> {
+    /// Arms from the stone's centroid and normals, in the first epoch.
+    pub points: Vec<[Vector3<f64>; 2]>,
+    second: &'a GicpBlock,
+    /// Centroid of the stone in the frame of the second block.
+    centre: Point3<f64>,
+    params: &'a GicpParams,
 }
 
 /// A point with its partner under some motion.
 pub(super) struct Pair {
     /// Turned arm.
     pub arm: Vector3<f64>,
-    /// Turned normal of the first epoch.
-    pub normal: Vector3<f64>,
-    /// Normal of the partner.
-    pub normal_second: Vector3<f64>,
+    /// Turned normal of the first epoch, and that of the partner, with equal signs.
+    pub normals: [Vector3<f64>; 2],
     /// From the moved point to its partner.
     pub residual: Vector3<f64>,
 }
 
 impl Pair {
-    /// Inverse of the sum of both planes' covariances, `2 I - (1 - epsilon) (n n' + m m')`, by the formula of
-    /// Sherman, Morrison & Woodbury.
+    /// Mean of both normals, of unit length.
+    pub fn normal(&self) -> Vector3<f64> {
+        (self.normals[0] + self.normals[1]).normalize()
+    }
+
+    /// Inverse of the sum of both planes' covariances.
     pub fn weight(&self, epsilon: f64) -> Matrix3<f64> {
-        let (n, m) = (&self.normal, &self.normal_second);
-        let share = 1.0 - epsilon;
-        let (across, alike) = (2.0 - share, share * n.dot(m));
-        let scale = 0.5 * share / (across * across - alike * alike);
-        let [own, other] = [across, alike].map(|part| part * scale);
-        let (u, v) = (n * own + m * other, n * other + m * own);
-        let weight = |a: usize, b: usize| n[a] * u[b] + m[a] * v[b];
-        let [xy, yz, zx] = [weight(0, 1), weight(1, 2), weight(2, 0)];
-        let [xx, yy, zz] = [0, 1, 2].map(|a| 0.5 + weight(a, a));
-        Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz)
-    }
-
-    /// Weighted vector of (displacement, rotation) that a pull at this point's place acts with.
-    pub fn lever(&self, pull: &Vector3<f64>) -> Vector6<f64> {
-        let moment = self.arm.cross(pull);
-        Vector6::new(pull.x, pull.y, pull.z, moment.x, moment.y, moment.z)
+        let [n, m] = &self.normals;
+        let across = n * n.transpose() + m * m.transpose();
+        let covariance = Matrix3::identity() * 2.0 - across * (1.0 - epsilon);
+        covariance.try_inverse().unwrap_or_default()
     }
 }
 
-/// Information on (displacement, rotation), summed over pairs.
-#[derive(Default)]
-pub(super) struct Information {
-    /// On the displacement.
-    shift: Matrix3<f64>,
-    /// Rows of the rotation, columns of the displacement.
-    cross: Matrix3<f64>,
-    /// On the rotation.
-    turn: Matrix3<f64>,
-}
-
-impl Information {
-    /// Adds the information of a symmetric weight at the end of an arm: `[I, A]' W [I, A]` with `A` the
-    /// transposed cross matrix of the arm.
-    pub fn add(&mut self, arm: &Vector3<f64>, weight: &Matrix3<f64>) {
-        let cross = Matrix3::from_columns(&[0, 1, 2].map(|i| arm.cross(&weight.column(i))));
-        self.shift += weight;
-        self.cross += cross;
-        self.turn += Matrix3::from_columns(&[0, 1, 2].map(|i| arm.cross(&cross.row(i).transpose())));
+impl<'a> Window<'a> {
+    /// All points of the first block within the buffer around any of the stone's points.
+    pub fn new(first: &GicpBlock, second: &'a GicpBlock, stone: &GicpStone, params: &'a GicpParams) -> Self {
+        let centre = Point3::from(stone.centroid - first.origin);
+        let kept = |i: &u32| Some(first.points[first.kept.binary_search(i).ok()?]);
+        let own: Vec<Point3<f64>> = stone.points.iter().filter_map(kept).collect();
+        let shape = GridIndex::new(&own, f64::max(0.25 * params.buffer_m, SHAPE_CELL_M));
+        let all = first.points.iter().zip(&first.normals);
+        let inside = all.filter(|(p, _)| shape.any_within(p, params.buffer_m));
+        Self {
+            points: inside.map(|(p, normal)| [p - centre, *normal]).collect(),
+            second,
+            centre: Point3::from(stone.centroid - second.origin),
+            params,
+        }
     }
 
-    /// The sum.
-    pub fn matrix(&self) -> Matrix6<f64> {
-        let mut h = Matrix6::zeros();
-        h.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.shift);
-        h.fixed_view_mut::<3, 3>(3, 0).copy_from(&self.cross);
-        h.fixed_view_mut::<3, 3>(0, 3).copy_from(&self.cross.transpose());
-        h.fixed_view_mut::<3, 3>(3, 3).copy_from(&self.turn);
-        h
+    /// The motion about the centroid at which the weighted residuals of all pairs balance: steps of Gauss and
+    /// Newton from no motion, until one moves no point by more than the tolerance.
+    ///
+    /// Partners change in jumps, so the balance may jump across zero without ever being zero. Steps that turn
+    /// back are halved: they close in on the place of the jump.
+    pub fn align(&self) -> Result<Rigid3, MotionFailure> {
+        let radius_m = self.points.iter().map(|[arm, _]| arm.norm()).fold(0.0, f64::max);
+        let needed = self.params.min_overlap * self.points.len() as f64;
+        let needed = needed.max(self.params.min_points as f64);
+        let (mut motion, mut damping, mut step) = (Rigid3::identity(), 1.0, Vector6::zeros());
+        for _ in 0..self.params.max_iterations {
+            let (mut information, mut pull, mut count) = (Matrix6::zeros(), Vector6::zeros(), 0.0);
+            for pair in self.pairs(&motion) {
+                let lever = lever(&pair.arm);
+                let weighted = lever.transpose() * pair.weight(self.params.plane_epsilon);
+                information += weighted * lever;
+                pull += weighted * pair.residual;
+                count += 1.0;
+            }
+            if count < needed {
+                return Err(MotionFailure::Disagreement);
+            }
+            let factor = information.cholesky().ok_or(MotionFailure::NotConverged)?;
+            damping = match pull.dot(&step) < 0.0 {
+                true => 0.5 * damping,
+                false => f64::min(RECOVERY * damping, 1.0),
+            };
+            step = factor.solve(&pull) * damping;
+            let (shift, turn) = (step.fixed_rows::<3>(0), step.fixed_rows::<3>(3));
+            motion.translation.vector += shift;
+            motion.rotation = UnitQuaternion::from_scaled_axis(turn.into_owned()) * motion.rotation;
+            if shift.norm() + radius_m * turn.norm() < self.params.tolerance_m {
+                return Ok(motion);
+            }
+        }
+        Err(MotionFailure::NotConverged)
     }
-}
 
-/// Calls `visit` for every point that has a partner under `motion`, in order; returns how many there are.
-pub(super) fn for_each_pair<'w>(
-    window: impl IntoIterator<Item = &'w mut WindowPoint>,
-    second: &GicpBlock,
-    centre: &Point3<f64>,
-    motion: &Motion,
-    max_m: f64,
-    mut visit: impl FnMut(&Pair),
-) -> usize {
-    let rotation = motion.turn.to_rotation_matrix();
-    let place = centre + motion.shift;
-    let mut count = 0;
-    for point in window {
-        let arm = rotation * point.arm;
-        if let Some((i, residual)) = point.partner.find(second, &(place + arm), max_m) {
-            count += 1;
-            visit(&Pair {
+    /// Every point that has a partner under a motion, in order.
+    pub fn pairs(&self, motion: &Rigid3) -> impl Iterator<Item = Pair> {
+        let (second, max_m) = (self.second, self.params.max_distance_m);
+        let rotation = motion.rotation.to_rotation_matrix();
+        let place = self.centre + motion.translation.vector;
+        self.points.iter().filter_map(move |[arm, normal]| {
+            let (arm, normal) = (rotation * arm, rotation * normal);
+            let (partner, _) = second.index.nearest(&(place + arm), max_m)?;
+            let other = second.normals[partner];
+            Some(Pair {
                 arm,
-                normal: rotation * point.normal,
-                normal_second: second.normal(i),
-                residual,
-            });
-        }
+                normals: [normal, other * normal.dot(&other).signum()],
+                residual: second.points[partner] - (place + arm),
+            })
+        })
     }
-    count
-}
-
-/// Points within the buffer around the stone's points.
-///
-/// `centroid`: of the stone, world; `stone`: its points, as indices into the cloud that the block was made
-/// from.
-pub(super) fn window_points(
-    first: &GicpBlock,
-    centroid: &Point3<f64>,
-    stone: &[u32],
-    buffer_m: f64,
-) -> Vec<WindowPoint> {
-    let centre = Point3::from(centroid - first.origin);
-    let stone = first.standing_for(stone);
-    let point = |i: usize| WindowPoint {
-        arm: first.points[i] - centre,
-        normal: first.normal(i),
-        partner: Partner::unknown(),
-    };
-    if buffer_m <= 0.0 {
-        return stone.iter().map(|&i| point(i as usize)).collect();
-    }
-    let own: Vec<Point3<f64>> = stone.iter().map(|&i| first.points[i as usize]).collect();
-    let radius = own.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
-    let shape = GridIndex::new(&own, 0.25 * buffer_m);
-
-    // For most points one of a few points of the stone is near enough; only the others need a search.
-    let few: Vec<Point3<f64>> = own
-        .iter()
-        .step_by(own.len().div_ceil(FEW).max(1))
-        .copied()
-        .collect();
-    let mut inside: Vec<usize> = Vec::new();
-    first.index.positions_within(&centre, radius + buffer_m, |i, p| {
-        let surely = (p - centre).norm() <= buffer_m - radius;
-        let is_near = |own: &Point3<f64>| (p - own).norm_squared() <= buffer_m * buffer_m;
-        if surely || few.iter().any(is_near) || shape.any_within(p, buffer_m) {
-            inside.push(i);
-        }
-    });
-
-    inside.sort_unstable();
-    inside.into_iter().map(point).collect()
 }

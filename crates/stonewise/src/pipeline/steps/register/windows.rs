@@ -79,7 +79,7 @@ fn align_group(
         .iter()
         .map(|(a, b)| (b.centroid - a.centroid).norm())
         .fold(0.0, f64::max);
-    let region = stones.grown(params.buffer_m + params.plane_radius_m + PLANE_MARGIN_M);
+    let region = stones.grown(params.buffer_m + PLANE_MARGIN_M);
     let (cloud, mut points) = labelled_region(labelled.first, &region, group)?;
     let reach = params.max_distance_m + largest_move;
     let cloud_second = labelled.later.ingested.tiles.load_region(&region.grown(reach))?;
@@ -90,7 +90,6 @@ fn align_group(
             first: a.id,
             second: b.id,
             centroid: a.centroid,
-            centroid_second: b.centroid,
             points: points.remove(&a.id.0).unwrap_or_default(),
             points_second: b.points as usize,
         })
