@@ -63,6 +63,8 @@ pub type Failure = Box<dyn std::error::Error>;
 pub struct Pair {
     /// Middle of each pair's points in the first epoch.
     pub places: Places,
+    /// Those that were measured, in the order of their errors.
+    ids: Vec<StoneId>,
     report: AdjustmentReport,
     errors: EpochErrors,
     pub deformation: Deformation,
@@ -83,6 +85,7 @@ impl Pair {
         };
         Ok(Self {
             places,
+            ids: seen.ids,
             report,
             errors,
             deformation,
@@ -115,104 +118,87 @@ pub fn measure(wall: &Wall, params: &AdjustmentParams) -> Result<Measured, Failu
 
 /// The claims about each measured stone with what is true of it.
 fn found(wall: &Wall, pair: &Pair) -> BTreeMap<StoneId, Found> {
-    let Pair {
-        places,
-        report,
-        errors,
-        deformation,
-    } = pair;
+    let errors = &pair.errors;
     let is_known = errors.datum != Datum::Unknown;
-    let measured: Vec<(StoneId, &StoneMotion, &Truth, Point3<f64>)> = report
+    let motions: BTreeMap<StoneId, &StoneMotion> = pair
+        .report
         .results
         .iter()
-        .filter_map(|r| {
-            let motion = r.motion.as_ref().ok()?;
-            Some((r.first, motion, wall.truth.get(&r.first.0)?, places[&r.first]))
-        })
+        .filter_map(|r| Some((r.first, r.motion.as_ref().ok()?)))
         .collect();
-    let own = |motion: &StoneMotion| motion.covariance.fixed_view::<3, 3>(0, 0).into_owned();
-    // Where the datum is known its error is taken off the motions; the rigid part of what is left is not in `free`.
-    let centre = errors.rigid.centre;
-    let free_of = |k: usize| {
-        let (_, motion, truth, place) = &measured[k];
-        let (mean, more) = match is_known {
-            true => {
-                let lever = lever(&(place - centre));
-                let rigid = lever * errors.rigid.covariance * lever.transpose();
-                (errors.at[k].mean, errors.at[k].covariance - rigid)
-            }
-            false => (Vector3::zeros(), errors.relative[k]),
-        };
-        (
-            motion.displacement - mean - truth.displacement(place),
-            own(motion) + more,
-        )
+    let place = |k: usize| &pair.places[&pair.ids[k]];
+    let motion = |k: usize| motions[&pair.ids[k]];
+    let truth = |k: usize| &wall.truth[&pair.ids[k].0];
+    let displacement = |k: usize| truth(k).displacement(place(k));
+    let own = |k: usize| motion(k).covariance.fixed_view::<3, 3>(0, 0).into_owned();
+    // The motion less the known error of the epochs, and what is claimed of it besides what all stones share.
+    let corrected = |k: usize| match is_known {
+        true => (
+            motion(k).displacement - errors.at[k].mean,
+            own(k) + errors.at[k].covariance,
+        ),
+        false => (motion(k).displacement, own(k) + errors.relative[k]),
     };
-    let kept: Vec<usize> = (0..measured.len()).filter(|k| !measured[*k].1.loose).collect();
+    let all = 0..pair.ids.len();
     let common = |of: &dyn Fn(usize) -> Vector3<f64>| {
-        let sample = |&k: &usize| DisplacementSample {
-            place: measured[k].3,
+        let sample = |k: usize| DisplacementSample {
+            place: *place(k),
             displacement: of(k),
-            covariance: own(measured[k].1),
+            covariance: own(k),
         };
-        SmallMotion::fit(&kept.iter().map(sample).collect::<Vec<_>>())
-            .unwrap_or_else(|| SmallMotion::shift(Vector3::zeros()))
+        let samples: Vec<_> = all.clone().filter(|k| !motion(*k).loose).map(sample).collect();
+        SmallMotion::fit(&samples).unwrap_or_else(|| SmallMotion::shift(Vector3::zeros()))
     };
-    let of_motions = common(&|k| measured[k].1.displacement);
-    let of_errors = common(&|k| free_of(k).0);
+    let of_motions = common(&|k| corrected(k).0);
+    let of_errors = common(&|k| corrected(k).0 - displacement(k));
     let tested = |k: usize| {
-        let (_, motion, _, place) = &measured[k];
-        let (expected, more) = match is_known {
-            true => (errors.at[k].mean, errors.at[k].covariance),
+        let (moved, spread) = corrected(k);
+        Some(match is_known {
+            true => (moved, spread),
             false => (
-                of_motions.at(place),
-                of_motions.covariance_at(place) + errors.relative[k],
+                moved - of_motions.at(place(k)),
+                spread + of_motions.covariance_at(place(k)),
             ),
-        };
-        Some((motion.displacement - expected, own(motion) + more))
+        })
     };
-    let tested: Vec<_> = (0..measured.len()).map(tested).collect();
+    let tested: Vec<_> = all.clone().map(tested).collect();
     let moved = moved_stones(&tested, FALSE_DISCOVERIES);
-    let deformed = true_deformations(wall, places, report, deformation);
+    let deformed = true_deformations(wall, pair);
     let claim = |k: usize| {
-        let (id, motion, truth, place) = &measured[k];
-        let face = FaceFrame::from_normal(&truth.normal).face_from_world();
+        let face = FaceFrame::from_normal(&truth(k).normal).face_from_world();
         let in_face = |(v, c): Claim| (face * v, face * c * face.transpose());
-        let (error, spread) = free_of(k);
-        let spread = match is_known {
-            true => spread,
-            false => spread + of_motions.covariance_at(place),
+        let (corrected, spread) = corrected(k);
+        // Of a known datum the rigid part of the claimed error is taken off with that of the error.
+        let rigid = match is_known {
+            true => {
+                let lever = lever(&(place(k) - errors.rigid.centre));
+                -lever * errors.rigid.covariance * lever.transpose()
+            }
+            false => of_motions.covariance_at(place(k)),
         };
+        let error = corrected - displacement(k);
+        let own = displacement(k) - truth(k).shared;
         let of_stone = Found {
-            is_called_loose: motion.loose,
+            is_called_loose: motion(k).loose,
             is_called_moved: moved[k],
-            absolute: is_known.then(|| {
-                let (moved, covariance) = tested[k].unwrap_or_default();
-                in_face((moved - truth.displacement(place), covariance))
-            }),
-            free: in_face((error - of_errors.at(place), spread)),
-            relative: in_face((
-                motion.relative - (truth.displacement(place) - truth.shared),
-                motion.relative_covariance,
-            )),
-            deformation: deformed.get(id).copied().map(in_face),
+            absolute: is_known.then(|| in_face((error, spread))),
+            free: in_face((error - of_errors.at(place(k)), spread + rigid)),
+            relative: in_face((motion(k).relative - own, motion(k).relative_covariance)),
+            deformation: deformed.get(&pair.ids[k]).copied().map(in_face),
         };
-        (*id, of_stone)
+        (pair.ids[k], of_stone)
     };
-    (0..measured.len()).map(claim).collect()
+    all.clone().map(claim).collect()
 }
 
 /// Errors of the deformations: against the true motion less its rigid part, which is that of the stones outside
 /// zones that kept their shape as far as they show.
-fn true_deformations(
-    wall: &Wall,
-    places: &Places,
-    report: &AdjustmentReport,
-    deformation: &Deformation,
-) -> BTreeMap<StoneId, Claim> {
-    let loose: BTreeSet<StoneId> = report
-        .results
-        .iter()
+fn true_deformations(wall: &Wall, pair: &Pair) -> BTreeMap<StoneId, Claim> {
+    let Pair {
+        places, deformation, ..
+    } = pair;
+    let results = pair.report.results.iter();
+    let loose: BTreeSet<StoneId> = results
         .filter(|r| r.motion.as_ref().is_ok_and(|m| m.loose))
         .map(|r| r.first)
         .collect();

@@ -1,7 +1,7 @@
 //! The yardstick: the one place where a change of the method is judged, on surveys of which the truth is known.
 //!
-//! `lab yardstick quick|full [--out FOLDER] [--filter NAME] [--off NAME,...] [--set KEY=VALUE,...] [--results FOLDER]`
-//! measures each survey whose name holds NAME, writes its figures into FOLDER as a line of JSON (those that are there
+//! `lab yardstick quick|full [--out FOLDER] [--filter NAME,...] [--off NAME,...] [--set KEY=VALUE,...] [--results FOLDER]`
+//! measures each survey whose name holds one of the NAMEs, writes its figures into FOLDER as a line of JSON (those that are there
 //! already are kept) and prints a table: a row is the mean of surveys that differ in their seed alone. `--off` switches
 //! mechanisms off (in a build with `--features switches`), `--set` sets parameters of the adjustment, `--results` holds
 //! results of runs of the real surveys, each in a folder of its name.
@@ -116,7 +116,7 @@ fn all(words: &Words, is_quick: bool) -> Outcome {
     let filter = words.option("--filter").unwrap_or_default();
     let chosen: Vec<Survey> = surveys::all()
         .into_iter()
-        .filter(|s| (s.is_quick || !is_quick) && s.name.contains(filter))
+        .filter(|s| (s.is_quick || !is_quick) && filter.split(',').any(|f| s.name.contains(f)))
         .collect();
     let (mut lines, mut missing) = (Vec::new(), Vec::new());
     for survey in &chosen {

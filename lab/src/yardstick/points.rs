@@ -33,7 +33,7 @@ pub fn mean(points: &[SurveyPoint]) -> Point3<f64> {
 }
 
 /// Normal of the plane through points, on the side of `outward`.
-pub fn face_normal(points: &[SurveyPoint], outward: &Vector3<f64>) -> Option<Vector3<f64>> {
+fn face_normal(points: &[SurveyPoint], outward: &Vector3<f64>) -> Option<Vector3<f64>> {
     let places: Vec<Point3<f64>> = points.iter().map(|p| p.place).collect();
     let normal = Plane::fit(&places)?.normal;
     Some(normal * normal.dot(outward).signum())
@@ -49,79 +49,57 @@ pub fn pairs(
     border_noises: f64,
 ) -> Vec<PairPoints> {
     let [first, second] = epochs;
-    let ids: Vec<u32> = first
-        .keys()
-        .copied()
-        .filter(|id| *id > 0 && second.contains_key(id))
-        .collect();
-    let centroids: Vec<Point3<f64>> = ids.iter().map(|id| mean(&first[id])).collect();
+    let is_shown = |id: &u32| {
+        let has_points = |e: &Points| e.get(id).is_some_and(|p| p.len() >= LEAST_POINTS);
+        *id > 0 && epochs.iter().all(has_points)
+    };
+    let ids: Vec<u32> = first.keys().copied().filter(is_shown).collect();
     let moved: Vec<(Point3<f64>, Vector3<f64>)> = ids
         .iter()
-        .zip(&centroids)
-        .map(|(id, c)| (*c, mean(&second[id]) - c))
+        .map(|id| (mean(&first[id]), mean(&second[id]) - mean(&first[id])))
         .collect();
-    let shifts = local_shifts(&moved);
-    let surroundings = Surroundings::new(epochs);
-
-    ids.par_iter()
-        .zip(&centroids)
-        .zip(&shifts)
-        .filter_map(|((&id, &centroid), shift)| {
-            let (points, other) = (&first[&id], &second[&id]);
-            if points.len().min(other.len()) < LEAST_POINTS {
-                return None;
-            }
-            let normal = face_normal(points, &outward(id)?)?;
-            let one = surroundings.near(0, id, &centroid, &Vector3::zeros());
-            let two = surroundings.near(1, id, &centroid, shift);
-            let chosen = stone_points([&one, &two], &normal, shift, border_noises);
-            Some(PairPoints {
-                first: StoneId(id),
-                second: StoneId(id),
-                centroid,
-                centroid_second: mean(other),
-                normal,
-                points_first: Cloud::new(centroid, chosen.first),
-                points_second: Cloud::new(centroid, chosen.second),
-                nearby_second: Cloud::new(centroid, chosen.nearby_second),
-                window: chosen.window.map(Arc::new),
-            })
-        })
-        .collect()
-}
-
-/// Points in and around stones.
-struct Surroundings<'a> {
-    epochs: &'a [Points; 2],
-    bounds: [BTreeMap<u32, Bounds>; 2],
-}
-
-impl<'a> Surroundings<'a> {
-    fn new(epochs: &'a [Points; 2]) -> Self {
-        let bounds = epochs.each_ref().map(|stones| {
-            let of = |(id, points): (&u32, &Vec<SurveyPoint>)| {
-                Some((*id, Bounds::of(points.iter().map(|p| p.place))?))
-            };
-            stones.iter().filter_map(of).collect()
-        });
-        Self { epochs, bounds }
-    }
-
-    /// A stone's points, and those of others at its place, moved by `shift`.
-    fn near(&self, epoch: usize, id: u32, centroid: &Point3<f64>, shift: &Vector3<f64>) -> Vec<NearPoint> {
-        let place = self.bounds[0][&id].grown(AROUND_M).moved(shift);
-        self.epochs[epoch]
+    let bounds = epochs.each_ref().map(|stones| {
+        let of = |(id, own): (&u32, &Vec<SurveyPoint>)| Some((*id, Bounds::of(own.iter().map(|p| p.place))?));
+        stones.iter().filter_map(of).collect::<BTreeMap<u32, Bounds>>()
+    });
+    // A stone's points, and those of others at its place, moved by `shift`.
+    let near = |epoch: usize, id: u32, centroid: &Point3<f64>, shift: &Vector3<f64>| -> Vec<NearPoint> {
+        let place = bounds[0][&id].grown(AROUND_M).moved(shift);
+        bounds[epoch]
             .iter()
-            .filter(|(k, _)| **k == id || self.bounds[epoch][*k].intersects(&place))
-            .flat_map(|(k, points)| points.iter().map(move |p| (*k == id, p)))
-            .filter(|(own, p)| *own || place.contains(&p.place))
+            .filter(|(k, of_stone)| **k == id || of_stone.intersects(&place))
+            .flat_map(|(k, _)| epochs[epoch][k].iter().map(move |p| (*k == id, p)))
+            .filter(|(labelled, p)| *labelled || place.contains(&p.place))
             .map(|(labelled, p)| NearPoint {
                 offset: (p.place - centroid).cast::<f32>().into(),
                 labelled,
                 source: p.source as u32,
             })
             .collect()
-    }
+    };
+    let pair = |(k, shift): (usize, &Vector3<f64>)| {
+        let (id, centroid) = (ids[k], moved[k].0);
+        let normal = face_normal(&first[&id], &outward(id)?)?;
+        let one = near(0, id, &centroid, &Vector3::zeros());
+        let two = near(1, id, &centroid, shift);
+        let chosen = stone_points([&one, &two], &normal, shift, border_noises);
+        Some(PairPoints {
+            first: StoneId(id),
+            second: StoneId(id),
+            centroid,
+            centroid_second: mean(&second[&id]),
+            normal,
+            points_first: Cloud::new(centroid, chosen.first),
+            points_second: Cloud::new(centroid, chosen.second),
+            nearby_second: Cloud::new(centroid, chosen.nearby_second),
+            window: chosen.window.map(Arc::new),
+        })
+    };
+    local_shifts(&moved)
+        .par_iter()
+        .enumerate()
+        .filter_map(pair)
+        .collect()
 }
 
 /// A stone as the sources of both epochs show it. `number`: of a source among all, from its epoch and its own.

@@ -8,7 +8,7 @@ use super::figures::{Figures, figures};
 use super::measure::{Failure, measure};
 use super::series::Series;
 use super::stored::Stored;
-use super::wall::{Fault, Instrument, Plan, Wall};
+use super::wall::{Instrument, Plan, Wall};
 use crate::figures::{peak_memory_mb, processor_seconds, reset_peak_memory};
 use stonewise_core::registration::AdjustmentParams;
 use stonewise_simulate::{StripDrift, WallMotion};
@@ -25,7 +25,7 @@ pub struct Survey {
 enum Made {
     Simulated(Box<Plan>),
     Stored(Stored),
-    Series(Series),
+    Series(Box<Series>),
 }
 
 impl Survey {
@@ -63,9 +63,10 @@ const SCANNER: Instrument = Instrument::Scanner(2);
 const DRONE: Instrument = Instrument::Drone(3);
 
 /// What measures both epochs.
-const MEASURED: [(&str, [Instrument; 2]); 7] = [
+const MEASURED: [(&str, [Instrument; 2]); 8] = [
     ("tls", [SCANNER; 2]),
     ("tls1", [Instrument::Scanner(1); 2]),
+    ("tls6", [Instrument::Scanner(6); 2]),
     ("uav", [DRONE; 2]),
     ("photos", [Instrument::Photos { is_joint: true }; 2]),
     ("photos2", [Instrument::Photos { is_joint: false }; 2]),
@@ -73,7 +74,16 @@ const MEASURED: [(&str, [Instrument; 2]); 7] = [
     ("uav_tls", [DRONE, SCANNER]),
 ];
 
-const MOTIONS: [&str; 7] = ["combo", "loose", "far", "crack", "creep", "settlement", "bulge"];
+const MOTIONS: [&str; 8] = [
+    "still",
+    "combo",
+    "loose",
+    "far",
+    "crack",
+    "creep",
+    "settlement",
+    "bulge",
+];
 
 /// What happens to the stones.
 fn happened(name: &str) -> Vec<WallMotion> {
@@ -113,126 +123,117 @@ fn happened(name: &str) -> Vec<WallMotion> {
     }
 }
 
-/// An event's name, what measures it, the motion of the stones, and what happens.
-type Happening = (&'static str, &'static [&'static str], &'static str, Vec<Event>);
+/// What else happens: its name, what measures it, the motion of the stones, and what is changed in the plan.
+type Kind = (&'static str, &'static [&'static str], &'static str, fn(&mut Plan));
 
-/// What else happens: its name, what measures it, the motion of the stones, and the events.
-///
-/// Mechanisms by events: `probe` far; `covered`, `foreign` ivy; `partial` car, snow, half; `halves` corners; `room`,
-/// `two_surfaces` partners, masks; `roughness` hut; `restart`, `bodies` buttress, door; `sensors` other_sensor;
+/// Mechanisms by what happens: `probe` far; `covered`, `foreign` ivy; `partial` car, snow, half; `halves` corners;
+/// `room`, `two_surfaces` partners, masks; `roughness` hut; `restart`, `bodies` buttress, door; `sensors` other_sensor;
 /// `correlation`, `stone_factor`, `slopes` lines; `crack`, `across` crack; `zone` creep; `octaves_shown`, `shared`
-/// photos; `obs_*` every survey with sources, stable and merged.
-fn events() -> Vec<Happening> {
-    vec![
-        ("masks", &["tls", "uav", "photos"], "combo", vec![Event::Masks]),
-        ("partners", &["tls", "uav"], "loose", vec![Event::Partners]),
-        ("corners", &["tls", "uav"], "loose", vec![Event::Corners]),
-        ("ivy", &["tls"], "still", vec![Event::Ivy(0.8)]),
-        ("thin_ivy", &["tls"], "still", vec![Event::Ivy(0.4)]),
-        ("snow", &["tls"], "still", vec![Event::Snow]),
-        ("car", &["tls", "uav"], "loose", vec![Event::Car]),
-        ("half", &["tls"], "still", vec![Event::Half]),
-        ("repairs", &["tls"], "still", vec![Event::Repairs]),
-        ("hut", &["uav"], "still", vec![Event::Hut(0.0)]),
-        ("moving_hut", &["tls", "uav"], "still", vec![Event::Hut(0.02)]),
-        ("door", &["tls", "photos"], "still", vec![Event::Door(0.1)]),
-        ("buttress", &["tls"], "still", vec![Event::Buttress(0.3, 0.0)]),
-        (
-            "moving_buttress",
-            &["tls", "uav"],
-            "still",
-            vec![Event::Buttress(0.3, 0.005)],
-        ),
-        ("lines", &["tls"], "combo", vec![Event::ScanLines]),
-        ("other_sensor", &["tls"], "combo", vec![Event::OtherSensor]),
-        ("noise", &["tls"], "combo", vec![Event::Noise(0.005)]),
-        ("rounded", &["tls"], "bulge", vec![Event::Rounded(0.005)]),
-        ("merged", &["tls", "uav"], "still", vec![Event::Merged]),
-    ]
-}
-
-/// What the sources get wrong on still walls: its name, what measures it, and the fault.
-const FAULTS: [(&str, &str, Fault); 9] = [
-    ("nothing_shared", "tls", Fault::Shared(0.0)),
-    ("shared_twice", "tls", Fault::Shared(2.0)),
-    ("shared_twice", "uav", Fault::Shared(2.0)),
-    ("scale", "tls", Fault::Scale(5e-5)),
-    ("surface", "tls", Fault::Surface(1.6e-3)),
-    ("walk", "uav", Fault::Drift(StripDrift::RandomWalk)),
-    ("sine", "uav", Fault::Drift(StripDrift::Sine)),
-    ("jump", "uav", Fault::Drift(StripDrift::Jump)),
-    ("adjusted", "uav", Fault::Adjusted),
+/// photos; `obs_*` every survey with sources, above all stable, merged and the faults of sources at the end.
+const KINDS: [Kind; 32] = [
+    ("masks", &["tls", "uav", "photos"], "combo", |p| {
+        p.events.push(Event::Masks)
+    }),
+    ("partners", &["tls", "uav"], "loose", |p| {
+        p.events.push(Event::Partners)
+    }),
+    ("corners", &["tls", "uav"], "loose", |p| {
+        p.events.push(Event::Corners)
+    }),
+    ("ivy", &["tls"], "still", |p| p.events.push(Event::Ivy(0.8))),
+    ("thin_ivy", &["tls"], "still", |p| p.events.push(Event::Ivy(0.4))),
+    ("snow", &["tls"], "still", |p| p.events.push(Event::Snow)),
+    ("car", &["tls", "uav"], "loose", |p| p.events.push(Event::Car)),
+    ("half", &["tls"], "still", |p| p.events.push(Event::Half)),
+    ("repairs", &["tls"], "still", |p| p.events.push(Event::Repairs)),
+    ("hut", &["uav"], "still", |p| p.events.push(Event::Hut(0.0))),
+    ("moving_hut", &["tls", "uav"], "still", |p| {
+        p.events.push(Event::Hut(0.02))
+    }),
+    ("door", &["tls", "photos"], "still", |p| {
+        p.events.push(Event::Door(0.1))
+    }),
+    ("buttress", &["tls"], "still", |p| {
+        p.events.push(Event::Buttress(0.3, 0.0))
+    }),
+    ("moving_buttress", &["tls", "uav"], "still", |p| {
+        p.events.push(Event::Buttress(0.3, 0.005))
+    }),
+    ("lines", &["tls"], "combo", |p| p.events.push(Event::ScanLines)),
+    ("other_sensor", &["tls"], "combo", |p| {
+        p.events.push(Event::OtherSensor)
+    }),
+    ("noise", &["tls"], "combo", |p| p.events.push(Event::Noise(0.005))),
+    ("rounded", &["tls"], "bulge", |p| {
+        p.events.push(Event::Rounded(0.005))
+    }),
+    ("merged", &["tls", "uav"], "still", |p| {
+        p.events.push(Event::Merged)
+    }),
+    ("stable", &["tls", "uav"], "still", |p| p.has_stable = true),
+    ("stable", &["tls", "uav"], "settlement", |p| p.has_stable = true),
+    ("nothing_shared", &["tls"], "still", |p| p.tls.datum_m = 0.0),
+    ("shared_twice", &["tls"], "still", |p| p.tls.datum_m *= 2.0),
+    ("shared_twice", &["uav"], "still", |p| p.uav.datum_m *= 2.0),
+    ("scale", &["tls"], "still", |p| p.tls.scale_error = 5e-5),
+    ("incidence", &["tls"], "still", |p| {
+        p.tls.beam.incidence_m = 1.6e-3
+    }),
+    ("darkness", &["tls"], "still", |p| p.tls.beam.darkness_m = 4e-4),
+    ("walk", &["uav"], "still", |p| {
+        p.uav.drift = StripDrift::RandomWalk
+    }),
+    ("sine", &["uav"], "still", |p| p.uav.drift = StripDrift::Sine),
+    ("jump", &["uav"], "still", |p| p.uav.drift = StripDrift::Jump),
+    ("adjusted", &["uav"], "still", |p| p.uav.adjusted = true),
+    ("large", &["tls6", "uav"], "combo", |p| {
+        (p.size_m, p.tls.reach_m) = ([60.0, 3.0], 12.0)
+    }),
 ];
 
 /// Surveys of each simulated kind in `full`.
 const SEEDS: u64 = 5;
 
-/// All surveys, in their order. `quick` has one of each kind, and four where nothing moves.
+/// All surveys, in their order. `quick` has one of each small kind, and four where nothing happens.
 pub fn all() -> Vec<Survey> {
     let mut list = Vec::new();
-    let mut add = |name: String, plan: Plan, quick: u64| {
+    let mut add = |name: String, quick: u64, made: &dyn Fn() -> Made| {
         list.extend((1..=SEEDS).map(|seed| Survey {
             name: format!("{name}-{seed}"),
             seed: 100 * number_of(&name) + seed,
-            made: Made::Simulated(Box::new(plan.clone())),
+            made: made(),
             is_quick: seed <= quick,
         }));
     };
-    let plan = |instruments, motion| Plan {
-        instruments,
-        size_m: [3.0, 2.0],
-        motions: happened(motion),
-        events: Vec::new(),
-        fault: Fault::Usual,
-        has_stable: false,
-    };
-    let by = |names: &'static [&'static str]| MEASURED.into_iter().filter(|m| names.contains(&m.0));
-    for (measured, instruments) in MEASURED {
-        add(format!("{measured}-still"), plan(instruments, "still"), 4);
+    for (measured, instruments) in MEASURED.into_iter().filter(|m| m.0 != "tls6") {
         for motion in MOTIONS {
-            add(format!("{measured}-{motion}"), plan(instruments, motion), 1);
+            let plan = Plan::usual(instruments, happened(motion));
+            let quick = if motion == "still" { 4 } else { 1 };
+            add(format!("{measured}-{motion}"), quick, &|| {
+                Made::Simulated(Box::new(plan.clone()))
+            });
         }
     }
-    for (measured, instruments) in by(&["tls", "uav"]) {
-        for motion in ["still", "settlement"] {
-            let mut plan = plan(instruments, motion);
-            plan.has_stable = true;
-            add(format!("{measured}-{motion}-stable"), plan, 1);
+    for (kind, by, motion, change) in KINDS {
+        for (measured, instruments) in MEASURED.into_iter().filter(|m| by.contains(&m.0)) {
+            let mut plan = Plan::usual(instruments, happened(motion));
+            change(&mut plan);
+            let quick = u64::from(kind != "large");
+            let name = format!("{measured}-{motion}-{kind}");
+            add(name, quick, &|| Made::Simulated(Box::new(plan.clone())));
         }
-    }
-    for (event, measured, motion, events) in events() {
-        for (measured, instruments) in by(measured) {
-            let mut plan = plan(instruments, motion);
-            plan.events.clone_from(&events);
-            add(format!("{measured}-{motion}-{event}"), plan, 1);
-        }
-    }
-    for (name, measured, fault) in FAULTS {
-        for (_, instruments) in MEASURED.into_iter().filter(|m| m.0 == measured) {
-            let mut plan = plan(instruments, "still");
-            plan.fault = fault;
-            add(format!("{measured}-still-{name}"), plan, 1);
-        }
-    }
-    for (measured, instruments) in [("tls", [Instrument::Scanner(6); 2]), ("uav", [DRONE; 2])] {
-        let mut plan = plan(instruments, "combo");
-        plan.size_m = [60.0, 3.0];
-        add(format!("{measured}-combo-large"), plan, 0);
     }
     for (happened, creep_m, step_m) in [("still", 0.0, 0.0), ("creep", 0.002, 0.0), ("step", 0.0, 0.003)] {
-        let mut plan = plan([SCANNER; 2], "still");
+        let mut plan = Plan::usual([SCANNER; 2], Vec::new());
         plan.size_m = [2.0, 1.2];
         let series = Series {
             plan,
             creep_m,
             step_m,
         };
-        list.extend((1..=SEEDS).map(|seed| Survey {
-            name: format!("tls_series-{happened}-{seed}"),
-            seed: 100 * number_of(happened) + seed,
-            made: Made::Series(series.clone()),
-            is_quick: seed <= 1,
-        }));
+        add(format!("tls_series-{happened}"), 1, &|| {
+            Made::Series(Box::new(series.clone()))
+        });
     }
     let stored = Stored::all().into_iter().map(|(name, stored, is_quick)| Survey {
         name,

@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use stonewise_core::geometry::Rigid3;
 use stonewise_core::progress::Silent;
 use stonewise_simulate::{
-    FacePoint, Scan, SceneParams, SeenCells, Sensor, StripDrift, TlsParams, UavParams, WallMotion,
-    WallParams, Window, World, scan_window, stone_truths,
+    FacePoint, Scan, SceneParams, SeenCells, Sensor, TlsParams, UavParams, WallMotion, WallParams, Window,
+    World, scan_window, stone_truths,
 };
 
 /// Share of a face that must be seen in both epochs for the stone to count.
@@ -79,23 +79,6 @@ pub enum Instrument {
     Photos { is_joint: bool },
 }
 
-/// What the sources of an epoch get wrong.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Fault {
-    /// What is assumed of the sensor, no more.
-    Usual,
-    /// The sources of an epoch share no error, or twice what is assumed.
-    Shared(f64),
-    /// How strips drift.
-    Drift(StripDrift),
-    /// Software has adjusted the strips to each other.
-    Adjusted,
-    /// Ranges of a station are too long by a factor (sd).
-    Scale(f64),
-    /// Ranges are too long where a beam grazes the wall, and where it is dark, metres.
-    Surface(f64),
-}
-
 /// How a survey is made.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -103,11 +86,36 @@ pub struct Plan {
     pub size_m: [f64; 2],
     pub motions: Vec<WallMotion>,
     pub events: Vec<Event>,
-    pub fault: Fault,
+    /// What scanner and drone get wrong; the instruments say how many sources they have.
+    pub tls: TlsParams,
+    pub uav: UavParams,
     pub has_stable: bool,
 }
 
 impl Plan {
+    /// A small wall and the usual errors of these instruments.
+    pub fn usual(instruments: [Instrument; 2], motions: Vec<WallMotion>) -> Self {
+        Self {
+            instruments,
+            size_m: [3.0, 2.0],
+            motions,
+            events: Vec::new(),
+            tls: TlsParams {
+                registration_m: 4e-4,
+                datum_m: 3e-4,
+                spacing_m: 0.007,
+                ..TlsParams::default()
+            },
+            uav: UavParams {
+                datum_m: 2e-3,
+                drift_m: 3e-3,
+                spacing_m: 0.012,
+                ..UavParams::default()
+            },
+            has_stable: false,
+        }
+    }
+
     /// The survey of this plan. `seed`: of stones, motions and errors.
     pub fn make(&self, seed: u64) -> Wall {
         self.make_later(seed, 1)
@@ -180,47 +188,34 @@ impl Plan {
     }
 
     fn params(&self) -> SceneParams {
-        let [of_scanner, of_drone] = self.instruments.iter().fold([0, 0], |[s, d], i| match i {
-            Instrument::Scanner(count) => [*count, d],
-            Instrument::Drone(count) => [s, *count],
-            Instrument::Photos { .. } => [3, d],
-        });
-        let mut tls = TlsParams {
-            stations: of_scanner,
-            // On long walls a station sees its part, from farther away.
-            reach_m: if self.size_m[0] > 10.0 { 12.0 } else { 0.0 },
-            registration_m: 4e-4,
-            datum_m: 3e-4,
-            spacing_m: 0.007,
-            ..TlsParams::default()
-        };
-        let mut uav = UavParams {
-            strips: of_drone,
-            datum_m: 2e-3,
-            drift_m: 3e-3,
-            spacing_m: 0.012,
-            ..UavParams::default()
-        };
-        match self.fault {
-            Fault::Usual => (),
-            Fault::Shared(factor) => {
-                tls.datum_m *= factor;
-                uav.datum_m *= factor;
-            }
-            Fault::Drift(drift) => uav.drift = drift,
-            Fault::Adjusted => uav.adjusted = true,
-            Fault::Scale(sd) => tls.scale_error = sd,
-            Fault::Surface(error_m) => {
-                for beam in [&mut tls.beam, &mut uav.beam] {
-                    (beam.incidence_m, beam.darkness_m) = (error_m, 0.25 * error_m);
+        let (mut tls, mut uav) = (None, None);
+        for instrument in self.instruments {
+            match instrument {
+                Instrument::Drone(strips) => {
+                    uav = Some(UavParams {
+                        strips,
+                        ..self.uav.clone()
+                    })
+                }
+                Instrument::Scanner(stations) => {
+                    tls = Some(TlsParams {
+                        stations,
+                        ..self.tls.clone()
+                    })
+                }
+                Instrument::Photos { .. } => {
+                    tls = Some(TlsParams {
+                        stations: 3,
+                        ..self.tls.clone()
+                    })
                 }
             }
         }
         SceneParams {
             wall: WallParams::sized(self.size_m),
             motions: self.motions.clone(),
-            tls: (of_scanner > 0).then_some(tls),
-            uav: (of_drone > 0).then_some(uav),
+            tls,
+            uav,
             ..SceneParams::default()
         }
     }
