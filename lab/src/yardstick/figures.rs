@@ -151,16 +151,12 @@ pub fn figures(measured: &Measured) -> Figures {
         true => put("false_verdict", f64::from(u8::from(is_false))),
         false => put("missed_verdict", f64::from(u8::from(!is_shown))),
     }
-    let areas = &measured.areas;
-    if !areas.is_empty() {
-        let found = areas.iter().flatten().count();
+    if !measured.areas.is_empty() {
+        let found = measured.areas.iter().filter(|found| **found).count();
         put("areas_found", found as f64);
-        put("areas_missed", (areas.len() - found) as f64);
-        put(
-            "areas_held",
-            areas.iter().flatten().filter(|held| **held).count() as f64 / found as f64,
-        );
+        put("areas_missed", (measured.areas.len() - found) as f64);
     }
+    put("areas_held", share(measured.held.len(), |k| measured.held[k]));
     put("areas_false", measured.false_areas.map_or(f64::NAN, |n| n as f64));
     put(
         "datum_known",

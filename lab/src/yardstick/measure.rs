@@ -50,8 +50,10 @@ pub struct Measured {
     pub stones: Vec<(Truth, Option<Found>)>,
     pub is_still: bool,
     pub is_deformed: bool,
-    /// Each true area: `None` missed, else whether the interval of its size holds the true one.
-    pub areas: Vec<Option<bool>>,
+    /// Whether each true area was found.
+    pub areas: Vec<bool>,
+    /// Whether the interval of the size holds the true one, of areas that were found; none where other motions add to it.
+    pub held: Vec<bool>,
     /// Areas where nothing moved; `None` where the truth has motions besides those of areas and single stones.
     pub false_areas: Option<usize>,
 }
@@ -100,15 +102,23 @@ pub fn measure(wall: &Wall, params: &AdjustmentParams) -> Result<Measured, Failu
         places, deformation, ..
     } = &pair;
     let mut found = found(wall, &pair);
-    let held = |area: &Area| {
-        let zone = zone_over(area, places, deformation)?;
-        Some((zone.interval_m[0]..=zone.interval_m[1]).contains(&area.largest_m))
+    let zones: Vec<Option<&DeformationZone>> = wall
+        .areas
+        .iter()
+        .map(|area| zone_over(area, places, deformation))
+        .collect();
+    let held = |(area, zone): (&Area, &Option<&DeformationZone>)| {
+        Some((zone.as_ref()?.interval_m[0]..=zone.as_ref()?.interval_m[1]).contains(&area.largest_m))
     };
     let stone = |(id, truth): (&u32, &Truth)| (truth.clone(), found.remove(&StoneId(*id)));
     Ok(Measured {
         is_still: wall.is_still,
         is_deformed: deformation.is_shown(),
-        areas: wall.areas.iter().map(held).collect(),
+        areas: zones.iter().map(Option::is_some).collect(),
+        held: match wall.is_still_elsewhere {
+            true => wall.areas.iter().zip(&zones).filter_map(held).collect(),
+            false => Vec::new(),
+        },
         false_areas: wall
             .is_still_elsewhere
             .then(|| false_zones(wall, places, deformation)),

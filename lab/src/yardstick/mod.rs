@@ -30,6 +30,7 @@ use figures::{Figures, LEVELS};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hasher};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use stonewise_core::registration::AdjustmentParams;
 use stonewise_io::atomic::write_atomically;
@@ -131,7 +132,9 @@ fn all(words: &Words, is_quick: bool) -> Outcome {
             continue;
         }
         eprintln!("{}", survey.name);
-        match survey.figures(&params, words.option("--results")) {
+        let figures = || survey.figures(&params, words.option("--results"));
+        // A panic is the failure of one survey.
+        match catch_unwind(AssertUnwindSafe(figures)).unwrap_or_else(|_| Err("it panicked".into())) {
             Ok(figures) => {
                 let line = Line {
                     survey: survey.name.clone(),

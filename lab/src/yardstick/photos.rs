@@ -2,23 +2,24 @@
 //!
 //! A stabiliser moves a lens element and with it the principal point of each photo (image-variant interior orientation:
 //! Tecklenburg, Luhmann and Hastedt 2001). A bundle with one shared camera turns and shifts the photos until most of it
-//! is compensated; the rest bends the cloud. With A the derivatives of image points by poses, B by the places of tie
-//! points and F the shift of the principal point, the bundle takes the poses for (A'PA)^-1 A'P F, P = I - B (B'B)^-1 B',
-//! and a place that is matched moves by (B'B)^-1 B' (F - A poses).
+//! is compensated; the rest bends the cloud. With A the derivatives of image points by poses and by what the bundle
+//! estimates of the camera (focal length, radial distortion), B by the places of tie
+//! points and F the shift of the principal point, the bundle takes poses and camera for (A'PA)^-1 A'P F, P = I - B (B'B)^-1 B',
+//! and a place that is matched moves by (B'B)^-1 B' (F - A (poses, camera)).
 
 use super::points::{Points, SurveyPoint};
 use super::wall::Instrument;
-use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix3, Point3, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x3, Matrix3, Point3, Vector2, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use stonewise_core::geometry::{DisplacementSample, SmallMotion};
 use stonewise_simulate::{Noise, Scan, normal};
 
-/// Photos of an epoch, in two rows.
-const PHOTOS: usize = 6;
-/// Distance from the wall, and focal length in pixels: 2.5 mm a pixel.
-const DISTANCE_M: f64 = 6.0;
-const FOCAL_PX: f64 = 2400.0;
+/// Photos of an epoch, in a row.
+const PHOTOS: usize = 4;
+/// Distance from the wall, and focal length in pixels: 3.8 mm a pixel.
+const DISTANCE_M: f64 = 4.5;
+const FOCAL_PX: f64 = 1200.0;
 /// Standard deviation of a principal point per axis, pixels.
 const PRINCIPAL_PX: f64 = 3.0;
 /// Places of tie points along and up the wall.
@@ -31,6 +32,8 @@ const SMOOTH_LENGTH_M: f64 = 0.45;
 const POINT_M: [f64; 2] = [1.2e-3, 3e-4];
 /// What the standard deviation of gradient noise is about.
 const NOISE_SD: f64 = 0.3;
+/// Unknowns of the camera: focal length, radial distortion.
+const CAMERA: usize = 2;
 /// Keeps the datum of a free bundle solvable; far below what any tie point says.
 const RIDGE: f64 = 1e-6;
 
@@ -49,8 +52,9 @@ pub struct PhotoErrors {
 
 struct Epoch {
     photos: Vec<Photo>,
-    /// What the bundle gets wrong of each photo's rotation and place.
+    /// What the bundle gets wrong of each photo's rotation and place, and of the camera.
     poses: DVector<f64>,
+    camera: DVector<f64>,
     /// What the control points take off.
     datum: SmallMotion,
     scale: f64,
@@ -63,24 +67,27 @@ impl PhotoErrors {
         let photos = [0, 1].map(|_| taken(size_m, &mut rng));
         let ties = ties(size_m);
         let is_joint = instruments == [Instrument::Photos { is_joint: true }; 2];
-        let poses = match is_joint {
-            true => {
-                let all: Vec<&Photo> = photos.iter().flatten().collect();
-                let poses = bundle(&all, &ties);
-                [0, 1].map(|e| poses.rows(6 * PHOTOS * e, 6 * PHOTOS).into_owned())
-            }
-            false => photos
-                .each_ref()
-                .map(|p| bundle(&p.iter().collect::<Vec<_>>(), &ties)),
+        let split = |first: usize, all: &DVector<f64>| {
+            let camera = all.rows(all.len() - CAMERA, CAMERA);
+            (all.rows(6 * first, 6 * PHOTOS).into_owned(), camera.into_owned())
         };
-        let mut poses = poses.into_iter();
+        let bundles = match is_joint {
+            true => {
+                let all = bundle(photos.iter().flatten(), &ties);
+                [split(0, &all), split(PHOTOS, &all)]
+            }
+            false => photos.each_ref().map(|p| split(0, &bundle(p.iter(), &ties))),
+        };
+        let mut bundles = bundles.into_iter();
         let epochs = photos.map(|photos| {
             let mut draw = |sd: f64| Vector3::from_fn(|_, _| sd * normal(&mut rng));
             let mut error = SmallMotion::shift(draw(DATUM[0]));
             error.motion.fixed_rows_mut::<3>(3).copy_from(&draw(DATUM[1]));
+            let (poses, camera) = bundles.next().unwrap();
             let free = Epoch {
                 photos,
-                poses: poses.next().unwrap(),
+                poses,
+                camera,
                 datum: SmallMotion::shift(Vector3::zeros()),
                 scale: 0.0,
                 error,
@@ -120,11 +127,19 @@ impl Epoch {
         self.triangulated(place) - self.datum.at(place) - self.scale * (place - self.datum.centre)
     }
 
+    /// The shift of an image point that the bundle does not explain, pixels.
+    fn left(&self, photo: usize, place: &Point3<f64>) -> Vector2<f64> {
+        let (by_pose, _) = self.photos[photo].derivatives(place);
+        self.photos[photo].principal
+            - by_pose * self.poses.fixed_rows::<6>(6 * photo)
+            - self.photos[photo].by_camera(place) * self.camera.fixed_rows::<CAMERA>(0)
+    }
+
     fn triangulated(&self, place: &Point3<f64>) -> Vector3<f64> {
         let (mut information, mut right) = (Matrix3::zeros(), Vector3::zeros());
         for (k, photo) in self.photos.iter().enumerate() {
-            let (by_pose, by_place) = photo.derivatives(place);
-            let left = photo.principal - by_pose * self.poses.fixed_rows::<6>(6 * k);
+            let (_, by_place) = photo.derivatives(place);
+            let left = self.left(k, place);
             information += by_place.transpose() * by_place;
             right += by_place.transpose() * left;
         }
@@ -153,6 +168,13 @@ impl Epoch {
 }
 
 impl Photo {
+    /// The image point by focal length and radial distortion, both relative; pixels.
+    fn by_camera(&self, place: &Point3<f64>) -> Matrix2<f64> {
+        let p = self.axes * (place - self.centre);
+        let image = p.xy() / p.z;
+        Matrix2::from_columns(&[image, image * image.norm_squared()]) * FOCAL_PX
+    }
+
     /// The image point by rotation and place of the photo, and by the place that it shows; pixels by radians, metres.
     fn derivatives(&self, place: &Point3<f64>) -> (nalgebra::SMatrix<f64, 2, 6>, Matrix2x3<f64>) {
         let p = self.axes * (place - self.centre);
@@ -167,19 +189,14 @@ impl Photo {
     }
 }
 
-/// Photos before a wall, aimed at its middle from wherever one stands.
+/// Photos square on to a wall from wherever one stands.
 fn taken([width_m, height_m]: [f64; 2], rng: &mut ChaCha8Rng) -> Vec<Photo> {
-    let columns = PHOTOS / 2;
     let photo = |k: usize| {
-        let along = (k % columns) as f64 / (columns - 1) as f64 - 0.5;
-        let mut off = || 0.2 * normal(rng);
-        let up = if k < columns { 0.25 } else { 0.9 };
-        let centre = Point3::new(
-            DISTANCE_M + off(),
-            1.2 * width_m * along + off(),
-            up * height_m + off(),
-        );
-        let aim = Point3::new(-0.1 * height_m, 0.4 * width_m * along, 0.5 * height_m);
+        let along = 0.6 * width_m * (k as f64 / (PHOTOS - 1) as f64 - 0.5);
+        let up = height_m * [0.3, 0.7][k % 2];
+        let mut off = || Vector3::from_fn(|_, _| 0.2 * normal(rng));
+        let centre = Point3::new(DISTANCE_M, along, up) + off();
+        let aim = Point3::new(0.0, along, 0.5 * height_m) + off();
         let ahead = (aim - centre).normalize();
         let right = ahead.cross(&Vector3::z()).normalize();
         let down = ahead.cross(&right);
@@ -210,26 +227,32 @@ fn ties([width_m, height_m]: [f64; 2]) -> Vec<Point3<f64>> {
     (0..TIES[0] * TIES[1]).map(tie).collect()
 }
 
-/// What a free bundle of photos that share one camera makes of their poses.
-fn bundle(photos: &[&Photo], ties: &[Point3<f64>]) -> DVector<f64> {
-    let unknowns = 6 * photos.len();
+/// What a free bundle of photos that share one camera makes of their poses, and last of the camera.
+fn bundle<'a>(photos: impl Iterator<Item = &'a Photo>, ties: &[Point3<f64>]) -> DVector<f64> {
+    let photos: Vec<&Photo> = photos.collect();
+    let (rows, unknowns) = (2 * photos.len(), 6 * photos.len() + CAMERA);
     let (mut information, mut right) = (DMatrix::zeros(unknowns, unknowns), DVector::zeros(unknowns));
     for tie in ties {
-        let mut by_poses = DMatrix::zeros(2 * photos.len(), unknowns);
-        let mut by_place = DMatrix::zeros(2 * photos.len(), 3);
-        let mut shifts = DVector::zeros(2 * photos.len());
+        let mut by_unknowns = DMatrix::zeros(rows, unknowns);
+        let mut by_place = DMatrix::zeros(rows, 3);
+        let mut shifts = DVector::zeros(rows);
         for (k, photo) in photos.iter().enumerate() {
             let (of_pose, of_place) = photo.derivatives(tie);
-            by_poses.fixed_view_mut::<2, 6>(2 * k, 6 * k).copy_from(&of_pose);
+            let of_camera = photo.by_camera(tie);
+            by_unknowns
+                .fixed_view_mut::<2, 6>(2 * k, 6 * k)
+                .copy_from(&of_pose);
+            by_unknowns
+                .fixed_view_mut::<2, CAMERA>(2 * k, 6 * photos.len())
+                .copy_from(&of_camera);
             by_place.fixed_view_mut::<2, 3>(2 * k, 0).copy_from(&of_place);
             shifts.fixed_rows_mut::<2>(2 * k).copy_from(&photo.principal);
         }
         let inverse = (by_place.transpose() * &by_place).try_inverse().unwrap();
-        let kept = DMatrix::identity(2 * photos.len(), 2 * photos.len())
-            - &by_place * inverse * by_place.transpose();
-        let of_poses = by_poses.transpose() * kept;
-        information += &of_poses * &by_poses;
-        right += of_poses * shifts;
+        let kept = DMatrix::identity(rows, rows) - &by_place * inverse * by_place.transpose();
+        let kept = by_unknowns.transpose() * kept;
+        information += &kept * &by_unknowns;
+        right += kept * shifts;
     }
     for k in 0..unknowns {
         information[(k, k)] += RIDGE * information[(k, k)];
@@ -258,9 +281,7 @@ mod tests {
                 for epoch in &errors.epochs {
                     let moved = epoch.triangulated(&place);
                     for (k, photo) in epoch.photos.iter().enumerate() {
-                        let (by_pose, by_place) = photo.derivatives(&place);
-                        let rest =
-                            photo.principal - by_pose * epoch.poses.fixed_rows::<6>(6 * k) - by_place * moved;
+                        let rest = epoch.left(k, &place) - photo.derivatives(&place).1 * moved;
                         left += rest.norm_squared() / 2.0;
                         counts[1] += 1.0;
                     }
@@ -271,14 +292,15 @@ mod tests {
     }
 
     /// Measured on two real walls: image residuals of 0.05 to 0.12 px, clouds of one bundle apart by about 1 mm, of a
-    /// bundle an epoch by several times as much.
+    /// bundle an epoch by more.
     #[test]
     fn errors_are_as_large_as_on_real_walls() {
         let [left_px, apart_mm] = sizes(true);
+        eprintln!("{left_px} {apart_mm} {:?}", sizes(false));
         assert!((0.04..0.15).contains(&left_px), "{left_px} px");
         assert!((0.4..2.0).contains(&apart_mm), "{apart_mm} mm");
         let [_, single_mm] = sizes(false);
-        assert!(single_mm > 1.3 * apart_mm, "{single_mm} mm against {apart_mm}");
+        assert!(single_mm > 1.4 * apart_mm, "{single_mm} mm against {apart_mm}");
     }
 
     /// A turn or a shift of all photos is no error of the interior orientation: the derivatives agree with differences.
