@@ -59,3 +59,4 @@ pub mod mesh_ply;
 mod photo_name;
 pub mod table;
 pub mod wall;
+mod xml;

@@ -1,6 +1,8 @@
 //! What can go wrong with camera files and photo folders.
 
 use crate::image_io::ImageIoError;
+use crate::xml;
+use roxmltree::Document;
 use std::path::{Path, PathBuf};
 
 /// Why cameras or photos could not be read or written.
@@ -123,6 +125,11 @@ pub(super) fn read_text(path: &Path) -> Result<String, CameraError> {
         path: path.to_owned(),
         source,
     })
+}
+
+/// Parses the text of an XML file.
+pub(super) fn parse_xml<'a>(text: &'a str, path: &Path) -> Result<Document<'a>, CameraError> {
+    xml::parse(text).map_err(|error| malformed(path, format!("line {}", error.line), error.problem))
 }
 
 /// Builds "this file, at this place, has this problem".

@@ -21,7 +21,6 @@ mod read;
 mod realitycapture;
 mod remark;
 mod unread;
-mod xml;
 
 pub use camera_file::CameraFile;
 pub use colmap::{is_camera_folder, write_colmap};
@@ -38,4 +37,4 @@ pub use realitycapture::is_sidecar_folder;
 pub use remark::Remark;
 pub use unread::unread_cameras;
 
-use error::{malformed, read_text};
+use error::{malformed, parse_xml, read_text};

@@ -5,8 +5,8 @@
 //! band of the first image counts.
 
 use super::geoid::Geoid;
-use quick_xml::Reader;
-use quick_xml::events::Event;
+use crate::xml::{Element, parse};
+use std::collections::BTreeMap;
 use std::io::Cursor;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
@@ -94,11 +94,11 @@ impl Band {
             value.map_or(Ok(String::new()), |value| value.into_string().map_err(failed))
         };
         let (metadata, no_height) = (text(GDAL_METADATA)?, text(Tag::GdalNodata)?);
-        let what = item(&metadata, "description")?.unwrap_or_default();
-        if what.ends_with("_offset") {
+        let items = items(&metadata)?;
+        if let Some(what) = items.get("description").filter(|what| what.ends_with("_offset")) {
             return Err(format!("its first band is a {what}"));
         }
-        let number = |role: &str, other: f64| match item(&metadata, role)? {
+        let number = |role: &str, other: f64| match items.get(role) {
             Some(text) => text.parse().map_err(|_| format!("its {role} is not a number")),
             None => Ok(other),
         };
@@ -134,24 +134,16 @@ impl Band {
     }
 }
 
-/// The metadata item of the first band that has this role.
-fn item(metadata: &str, role: &str) -> Result<Option<String>, String> {
-    let mut reader = Reader::from_str(metadata);
-    loop {
-        let broken = |error: quick_xml::Error| format!("its metadata are broken: {error}");
-        match reader.read_event().map_err(broken)? {
-            Event::Start(tag) => {
-                let has = |key: &str, value: &str| {
-                    let found = tag.try_get_attribute(key).ok().flatten();
-                    found.is_some_and(|found| &*found.value == value)
-                };
-                if has("sample", "0") && has("role", role) {
-                    let text = reader.read_text(tag.name()).map_err(broken)?;
-                    return Ok(Some(text.trim().to_owned()));
-                }
-            }
-            Event::Eof => return Ok(None),
-            _ => {}
-        }
+/// The metadata of the first band by their roles.
+fn items(metadata: &str) -> Result<BTreeMap<String, String>, String> {
+    if metadata.trim().is_empty() {
+        return Ok(BTreeMap::new());
     }
+    let document = parse(metadata).map_err(|e| format!("its metadata are broken: {}", e.problem))?;
+    let of_band = Element::root(&document)
+        .children()
+        .filter(|item| item.attribute("sample") == Some("0"));
+    Ok(of_band
+        .filter_map(|item| Some((item.attribute("role")?.to_owned(), item.text().trim().to_owned())))
+        .collect())
 }

@@ -2,7 +2,8 @@
 //! files use each other in a circle.
 
 /// Modules from the bottom up; those on one line do not use each other.
-const LAYERS: [&[&str]; 4] = [
+const LAYERS: [&[&str]; 5] = [
+    &["xml"],
     &["atomic", "crs", "exif", "folder", "photo_name", "wall"],
     &["image_io"],
     &["cameras", "cloud", "mesh_ply", "table"],

@@ -1,8 +1,8 @@
 //! From the frames of cameras and chunks to the world.
 
-use super::super::xml::Element;
 use super::super::{CameraError, malformed};
 use super::numbers::parse_numbers;
+use crate::xml::Element;
 use nalgebra::{Matrix3, Point3, Vector3};
 use std::path::Path;
 use stonewise_core::geometry::{Rigid3, nearest_rotation};
@@ -24,13 +24,13 @@ impl Similarity {
     }
 
     /// A `<transform>`; `None` where it is empty.
-    fn read(element: &Element, path: &Path) -> Result<Option<Self>, CameraError> {
-        if element.children.is_empty() && element.text.trim().is_empty() {
-            return Ok(None);
-        }
-
-        if element.children.is_empty() {
-            let m = parse_numbers::<16>(&element.text, element, path)?;
+    fn read(element: Element<'_>, path: &Path) -> Result<Option<Self>, CameraError> {
+        if element.children().next().is_none() {
+            let text = element.text();
+            if text.trim().is_empty() {
+                return Ok(None);
+            }
+            let m = parse_numbers::<16>(&text, element, path)?;
             let linear = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
             let scale = linear.determinant().cbrt();
             let rotation = checked_rotation(&(linear / scale), element, path)?;
@@ -43,16 +43,16 @@ impl Similarity {
 
         let mut similarity = Self::identity();
         if let Some(rotation) = element.child("rotation") {
-            let m = parse_numbers::<9>(&rotation.text, rotation, path)?;
+            let m = parse_numbers::<9>(&rotation.text(), rotation, path)?;
             similarity.rotation = checked_rotation(&Matrix3::from_row_slice(&m), rotation, path)?;
         }
 
         if let Some(translation) = element.child("translation") {
-            similarity.translation = parse_numbers::<3>(&translation.text, translation, path)?.into();
+            similarity.translation = parse_numbers::<3>(&translation.text(), translation, path)?.into();
         }
 
         if let Some(scale) = element.child("scale") {
-            [similarity.scale] = parse_numbers::<1>(&scale.text, scale, path)?;
+            [similarity.scale] = parse_numbers::<1>(&scale.text(), scale, path)?;
             if similarity.scale <= 0.0 {
                 return Err(malformed(path, scale.place(), "scale must be positive"));
             }
@@ -62,8 +62,8 @@ impl Similarity {
     }
 
     /// The pose of a camera whose `<transform>` takes camera to chunk.
-    pub fn cam_from_world(&self, transform: &Element, path: &Path) -> Result<Rigid3, CameraError> {
-        let m = parse_numbers::<16>(&transform.text, transform, path)?;
+    pub fn cam_from_world(&self, transform: Element<'_>, path: &Path) -> Result<Rigid3, CameraError> {
+        let m = parse_numbers::<16>(&transform.text(), transform, path)?;
         let linear = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
         let chunk_from_cam = checked_rotation(&linear, transform, path)?;
         let centre = self.rotation * Vector3::new(m[3], m[7], m[11]) * self.scale + self.translation;
@@ -83,8 +83,8 @@ pub struct Frames {
 }
 
 impl Frames {
-    pub fn read(chunk: &Element, path: &Path) -> Result<Self, CameraError> {
-        let own = |element: &Element| match element.child("transform") {
+    pub fn read(chunk: Element<'_>, path: &Path) -> Result<Self, CameraError> {
+        let own = |element: Element<'_>| match element.child("transform") {
             Some(transform) => Similarity::read(transform, path),
             None => Ok(None),
         };
@@ -129,7 +129,7 @@ impl Frames {
 
 fn checked_rotation(
     matrix: &Matrix3<f64>,
-    place: &Element,
+    place: Element<'_>,
     path: &Path,
 ) -> Result<Matrix3<f64>, CameraError> {
     let rotation = nearest_rotation(matrix).to_rotation_matrix().into_inner();

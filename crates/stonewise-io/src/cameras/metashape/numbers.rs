@@ -1,21 +1,21 @@
 //! Numbers in the text of elements.
 
-use super::super::xml::Element;
 use super::super::{CameraError, malformed};
+use crate::xml::Element;
 use std::path::Path;
 
 /// The number in a child element; `None` where there is no such child.
-pub fn child_number(parent: &Element, name: &str, path: &Path) -> Result<Option<f64>, CameraError> {
+pub fn child_number(parent: Element<'_>, name: &str, path: &Path) -> Result<Option<f64>, CameraError> {
     parent
         .child(name)
-        .map(|child| parse_numbers::<1>(&child.text, child, path).map(|[value]| value))
+        .map(|child| parse_numbers::<1>(&child.text(), child, path).map(|[value]| value))
         .transpose()
 }
 
 /// Exactly N finite numbers.
 pub fn parse_numbers<const N: usize>(
     text: &str,
-    place: &Element,
+    place: Element<'_>,
     path: &Path,
 ) -> Result<[f64; N], CameraError> {
     let numbers: Option<Vec<f64>> = text

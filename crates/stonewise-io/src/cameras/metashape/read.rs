@@ -1,10 +1,10 @@
 //! Reading of chunks, components and cameras.
 
 use super::super::map_frame::{MapFrame, Placing};
-use super::super::xml::{Element, parse};
-use super::super::{CameraError, CameraFile, Remark, malformed, read_text};
+use super::super::{CameraError, CameraFile, Remark, malformed, parse_xml, read_text};
 use super::frame::{Frames, Similarity};
 use super::sensor;
+use crate::xml::Element;
 use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_core::geometry::{Camera, View};
@@ -13,9 +13,10 @@ use stonewise_core::id::ImageId;
 /// Reads the first enabled chunk that has aligned cameras, and brings them to the clouds.
 pub fn read(path: &Path, map: &MapFrame) -> Result<CameraFile, CameraError> {
     let text = read_text(path)?;
-    let root = parse(&text, path)?;
-    let chunks: Vec<&Element> = match root.name.as_str() {
-        "chunk" => vec![&root],
+    let document = parse_xml(&text, path)?;
+    let root = Element::root(&document);
+    let chunks: Vec<Element> = match root.name() {
+        "chunk" => vec![root],
         "document" => root.all("chunk").collect(),
         other => {
             let problem = format!("<{other}> where Metashape writes <document>");
@@ -53,20 +54,21 @@ pub fn read(path: &Path, map: &MapFrame) -> Result<CameraFile, CameraError> {
     })
 }
 
-fn read_chunk(chunk: &Element, path: &Path, map: &MapFrame) -> Result<CameraFile, CameraError> {
+fn read_chunk(chunk: Element<'_>, path: &Path, map: &MapFrame) -> Result<CameraFile, CameraError> {
     let mut file = CameraFile {
         crs: chunk
             .child("reference")
-            .map(|r| r.text.trim().to_owned())
+            .map(|r| r.text().trim().to_owned())
             .filter(|crs| !crs.is_empty()),
         ..CameraFile::default()
     };
     let frames = Frames::read(chunk, path)?;
     let mut sensors: BTreeMap<&str, Camera> = BTreeMap::new();
-    let mut cameras = Vec::new();
-    if let Some(list) = chunk.child("cameras") {
-        collect_cameras(list, &mut cameras);
-    }
+    // Those in groups included.
+    let cameras = chunk
+        .child("cameras")
+        .into_iter()
+        .flat_map(|list| list.below("camera"));
     for element in cameras {
         let name = element.attribute("label").unwrap_or_default().to_owned();
         let posed = match posed(element, &frames) {
@@ -118,24 +120,13 @@ fn place(file: &mut CameraFile, path: &Path, map: &MapFrame) -> Result<(), Camer
     Ok(())
 }
 
-/// Cameras in file order, those in groups included.
-fn collect_cameras<'a>(parent: &'a Element, cameras: &mut Vec<&'a Element>) {
-    for child in &parent.children {
-        match child.name.as_str() {
-            "camera" => cameras.push(child),
-            "group" => collect_cameras(child, cameras),
-            _ => {}
-        }
-    }
-}
-
 struct Posed<'a> {
-    transform: &'a Element,
+    transform: Element<'a>,
     frame: &'a Similarity,
 }
 
 /// The camera's own transform and the frame it is in, or why it has none.
-fn posed<'a>(camera: &'a Element, frames: &'a Frames) -> Result<Posed<'a>, Remark> {
+fn posed<'a>(camera: Element<'a>, frames: &'a Frames) -> Result<Posed<'a>, Remark> {
     if is_disabled(camera) {
         return Err(Remark::Disabled);
     }
@@ -152,17 +143,17 @@ fn posed<'a>(camera: &'a Element, frames: &'a Frames) -> Result<Posed<'a>, Remar
 }
 
 fn find_sensor<'a>(
-    chunk: &'a Element,
+    chunk: Element<'a>,
     id: &str,
-    camera: &Element,
+    camera: Element<'_>,
     path: &Path,
-) -> Result<&'a Element, CameraError> {
+) -> Result<Element<'a>, CameraError> {
     chunk
         .child("sensors")
-        .and_then(|list| list.children.iter().find(|s| s.attribute("id") == Some(id)))
+        .and_then(|list| list.children().find(|s| s.attribute("id") == Some(id)))
         .ok_or_else(|| malformed(path, camera.place(), format!("sensor_id {id:?} names no sensor")))
 }
 
-fn is_disabled(element: &Element) -> bool {
+fn is_disabled(element: Element<'_>) -> bool {
     matches!(element.attribute("enabled"), Some("false" | "0"))
 }

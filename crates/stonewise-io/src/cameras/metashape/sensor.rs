@@ -1,8 +1,8 @@
 //! Interior orientation of a Metashape sensor.
 
-use super::super::xml::Element;
 use super::super::{CameraError, malformed};
 use super::numbers::{child_number, parse_numbers};
+use crate::xml::Element;
 use nalgebra::Vector3;
 use std::path::Path;
 use stonewise_core::geometry::{Camera, Distortion, NearPlane};
@@ -15,7 +15,7 @@ pub(super) const NEAR_PLANE: &str = "near_plane";
 /// With r the radius of (x, y) = (X/Z, Y/Z): x' = x (1 + k1 r^2 + .. + k4 r^8) + p1 (r^2 + 2 x^2) + 2 p2 x y,
 /// and y' likewise; u = w/2 + cx + x' f + x' b1 + y' b2, v = h/2 + cy + y' f. Metashape's p1 is OpenCV's p2
 /// and the other way round.
-pub fn camera(sensor: &Element, photo: &str, path: &Path) -> Result<Camera, CameraError> {
+pub fn camera(sensor: Element<'_>, photo: &str, path: &Path) -> Result<Camera, CameraError> {
     let of_class = |class: Option<&'static str>| {
         sensor
             .all("calibration")
@@ -72,7 +72,7 @@ pub fn camera(sensor: &Element, photo: &str, path: &Path) -> Result<Camera, Came
 }
 
 /// The near plane of a view of a cloud; cameras of photos have none.
-fn near_plane(sensor: &Element, path: &Path) -> Result<Option<NearPlane>, CameraError> {
+fn near_plane(sensor: Element<'_>, path: &Path) -> Result<Option<NearPlane>, CameraError> {
     let found = property::<4>(sensor, NEAR_PLANE, path)?;
     Ok(found.map(|[x, y, z, distance_m]| NearPlane {
         normal: Vector3::new(x, y, z),
@@ -82,7 +82,7 @@ fn near_plane(sensor: &Element, path: &Path) -> Result<Option<NearPlane>, Camera
 
 /// The numbers of a property of a sensor.
 fn property<const N: usize>(
-    sensor: &Element,
+    sensor: Element<'_>,
     name: &str,
     path: &Path,
 ) -> Result<Option<[f64; N]>, CameraError> {
@@ -90,12 +90,19 @@ fn property<const N: usize>(
     let Some(element) = element else {
         return Ok(None);
     };
-    let text = element.attribute("value").unwrap_or(&element.text);
-    Ok(Some(parse_numbers::<N>(text, element, path)?))
+    let text = element
+        .attribute("value")
+        .map_or_else(|| element.text(), str::to_owned);
+    Ok(Some(parse_numbers::<N>(&text, element, path)?))
 }
 
 /// Whether the model is a fisheye; an error where it is neither that nor a frame camera.
-fn check_model(sensor: &Element, model: Option<&str>, photo: &str, path: &Path) -> Result<bool, CameraError> {
+fn check_model(
+    sensor: Element<'_>,
+    model: Option<&str>,
+    photo: &str,
+    path: &Path,
+) -> Result<bool, CameraError> {
     match model.unwrap_or("frame") {
         "frame" => Ok(false),
         "fisheye" | "equidistant_fisheye" => Ok(true),
@@ -111,11 +118,11 @@ fn check_model(sensor: &Element, model: Option<&str>, photo: &str, path: &Path) 
 }
 
 fn resolution(
-    sensor: &Element,
-    calibration: Option<&Element>,
+    sensor: Element<'_>,
+    calibration: Option<Element<'_>>,
     path: &Path,
 ) -> Result<(u32, u32), CameraError> {
-    let read = |parent: &Element| -> Result<Option<(u32, u32)>, CameraError> {
+    let read = |parent: Element<'_>| -> Result<Option<(u32, u32)>, CameraError> {
         let Some(element) = parent.child("resolution") else {
             return Ok(None);
         };
@@ -147,7 +154,7 @@ fn resolution(
 }
 
 /// Focal length in pixels from the nominal one in millimetres.
-fn nominal_focal(sensor: &Element, path: &Path) -> Result<f64, CameraError> {
+fn nominal_focal(sensor: Element<'_>, path: &Path) -> Result<f64, CameraError> {
     let number = |name: &str| property::<1>(sensor, name, path);
     match (number("focal_length")?, number("pixel_width")?) {
         (Some([focal]), Some([pixel])) if focal > 0.0 && pixel > 0.0 => Ok(focal / pixel),

@@ -3,6 +3,7 @@
 use super::super::CameraError;
 use super::sensor::NEAR_PLANE;
 use crate::atomic::write_atomically;
+use crate::xml::escape;
 use std::fmt::Write as _;
 use std::path::Path;
 use stonewise_core::geometry::{Camera, Distortion, NearPlane, View};
@@ -31,7 +32,7 @@ pub fn write_metashape(path: &Path, views: &[View], crs: Option<&str>) -> Result
             cameras,
             "      <camera id=\"{id}\" sensor_id=\"{sensor}\" component_id=\"0\" label=\"{}\">\n        \
              <transform>{}</transform>\n        <orientation>1</orientation>\n      </camera>",
-            quick_xml::escape::escape(view.name.as_str()),
+            escape(&view.name),
             numbers.join(" "),
         );
     }
@@ -58,7 +59,7 @@ pub fn write_metashape(path: &Path, views: &[View], crs: Option<&str>) -> Result
         views.len()
     );
     text.push_str(&cameras);
-    let crs = quick_xml::escape::escape(crs.unwrap_or(LOCAL_CS));
+    let crs = escape(crs.unwrap_or(LOCAL_CS));
     let _ = writeln!(
         text,
         "    </cameras>\n    <reference>{crs}</reference>\n  </chunk>\n</document>"

@@ -2,16 +2,16 @@
 
 use super::super::photo_sizes::PhotoSizes;
 use super::super::pose::{camera_at, rotation};
-use super::super::xml::{Element, parse};
-use super::super::{CameraError, CameraFile, Remark, malformed, read_text};
+use super::super::{CameraError, CameraFile, Remark, malformed, parse_xml, read_text};
 use super::lens::{FILM_MM, Lens, unsupported};
 use crate::folder::files_below;
+use crate::xml::Element;
 use nalgebra::{Matrix3, Point3};
 use std::path::Path;
 use stonewise_core::geometry::{Rigid3, View};
 use stonewise_core::id::ImageId;
 
-/// Namespace that distinguishes these sidecars from those of other programs.
+/// What the namespace begins with that distinguishes these sidecars from those of other programs.
 const NAMESPACE: &str = "http://www.capturingreality.com/ns/xcr/";
 
 /// Whether sidecars of RealityCapture lie in a folder itself.
@@ -41,8 +41,8 @@ pub fn read_sidecars(folder: &Path, photos: Option<&Path>) -> Result<CameraFile,
         }
         let name = path.strip_prefix(folder).unwrap_or(path).with_extension("");
         let name = name.to_string_lossy().into_owned();
-        let root = parse(&text, path)?;
-        match Sidecar::of(&root, path, &name)? {
+        let document = parse_xml(&text, path)?;
+        match Sidecar::of(Element::root(&document), path, &name)? {
             Some(sidecar) => sidecars.push((name, sidecar)),
             None => file.skipped.push((name, Remark::NotAligned)),
         }
@@ -74,8 +74,8 @@ struct Sidecar {
 
 impl Sidecar {
     /// `None` where it gives no pose.
-    fn of(root: &Element, path: &Path, photo: &str) -> Result<Option<Self>, CameraError> {
-        let descriptions = root.all("rdf:RDF").flat_map(|rdf| rdf.all("rdf:Description"));
+    fn of(root: Element<'_>, path: &Path, photo: &str) -> Result<Option<Self>, CameraError> {
+        let descriptions = root.all("RDF").flat_map(|rdf| rdf.all("Description"));
         let mut tags = descriptions.map(|element| Tags { element, path });
         let Some(tags) = tags.find(|tags| tags.text("Position").is_some() && tags.text("Rotation").is_some())
         else {
@@ -94,15 +94,13 @@ impl Sidecar {
 
 /// Values are attributes or elements, whichever the version of the program writes.
 struct Tags<'a> {
-    element: &'a Element,
+    element: Element<'a>,
     path: &'a Path,
 }
 
 impl Tags<'_> {
-    fn text(&self, name: &str) -> Option<&str> {
-        let name = format!("xcr:{name}");
-        let child = self.element.child(&name).map(|child| child.text.as_str());
-        self.element.attribute(&name).or(child)
+    fn text(&self, name: &str) -> Option<String> {
+        self.element.value_in(NAMESPACE, name)
     }
 
     fn numbers<const N: usize>(&self, name: &str, or: [f64; N]) -> Result<[f64; N], CameraError> {
@@ -123,7 +121,8 @@ impl Tags<'_> {
     }
 
     fn lens(&self, photo: &str) -> Result<Lens, CameraError> {
-        let model = self.text("DistortionModel").unwrap_or("none");
+        let model = self.text("DistortionModel");
+        let model = model.as_deref().unwrap_or("none");
         let terms = self.numbers("DistortionCoeficients", [0.0; 6])?;
         let has_terms = terms.iter().any(|term| *term != 0.0);
         let terms = match model {
