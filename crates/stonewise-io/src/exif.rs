@@ -1,9 +1,13 @@
 //! What a camera writes beside the pixels of a photo: Exif 2.32 in JPEG and TIFF files.
 
+use exif::{Context, DateTime, In, Reader, Tag};
 use serde::Serialize;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
+use tiff::decoder::Decoder;
+use tiff::decoder::ifd::Value as TiffValue;
+use tiff::tags::Tag as TiffTag;
 
 /// What the camera says of a photo; every part is `None` where it says nothing, or nothing sound.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -22,200 +26,145 @@ pub struct Exif {
     pub altitude_m: Option<f64>,
 }
 
-/// Longest text and most entries that are read.
-const MOST_BYTES: u64 = 1024;
-const MOST_ENTRIES: u16 = 512;
+/// The value of a tag.
+enum Value {
+    Text(Vec<u8>),
+    Numbers(Vec<f64>),
+}
 
-/// Reads the Exif data of a JPEG or TIFF; `None` where there are none, or the file cannot be read.
+/// Reads the Exif data of a JPEG or TIFF; `None` where there are none, or the file cannot be read. Of a TIFF the tags alone
+/// are read, however large it is.
 pub fn read_exif(path: &Path) -> Option<Exif> {
     let mut file = BufReader::new(File::open(path).ok()?);
-    let mut start = [0; 2];
-    file.read_exact(&mut start).ok()?;
-    let base = if start == [0xff, 0xd8] {
-        exif_segment(&mut file)?
-    } else {
-        0
-    };
-    let mut tiff = Tiff::open(file, base)?;
-    let first = tiff.number(4, 4)?;
-    let main = tiff.entries(first);
-    let below = |tag: u16| main.iter().find(|e| e.tag == tag);
-    let own = below(0x8769).map(|e| e.place).and_then(|p| tiff.number(p, 4));
-    let own = own.map_or(Vec::new(), |place| tiff.entries(place));
+    let head = file.fill_buf().ok()?;
+    match head.get(..2)? {
+        b"II" | b"MM" => Some(describe(tiff_tags(file)?)),
+        _ => {
+            let mut reader = Reader::new();
+            let read = reader.continue_on_error(true).read_from_container(&mut file);
+            let found = read.or_else(|e| e.distill_partial_result(|_| ())).ok()?;
+            Some(describe(|tag| of_jpeg(&found.get_field(tag, In::PRIMARY)?.value)))
+        }
+    }
+}
 
-    let gps = below(0x8825).map(|e| e.place).and_then(|p| tiff.number(p, 4));
-    let gps = gps.map_or(Vec::new(), |place| tiff.entries(place));
-    let (make, model) = (tiff.text(&main, 0x010f), tiff.text(&main, 0x0110));
+fn of_jpeg(value: &exif::Value) -> Option<Value> {
+    match value {
+        exif::Value::Ascii(texts) => texts.first().cloned().map(Value::Text),
+        exif::Value::Rational(ratios) => Some(Value::Numbers(ratios.iter().map(|r| r.to_f64()).collect())),
+        value => Some(Value::Numbers(value.iter_uint()?.map(f64::from).collect())),
+    }
+}
+
+/// Looks tags up in the first image of a TIFF and in the directories of Exif and GPS that belong to it.
+fn tiff_tags(file: BufReader<File>) -> Option<impl FnMut(Tag) -> Option<Value>> {
+    let mut tiff = Decoder::new(file).ok()?;
+    let mut below = |tag: TiffTag| {
+        let pointer = tiff.find_tag(tag).ok()??.into_ifd_pointer().ok()?;
+        tiff.read_directory(pointer).ok()
+    };
+    let (own, gps) = (below(TiffTag::ExifDirectory), below(TiffTag::GpsDirectory));
+    Some(move |tag: Tag| {
+        let number = TiffTag::from_u16_exhaustive(tag.number());
+        let value = match tag.context() {
+            Context::Exif => tiff.read_directory_tags(own.as_ref()?).find_tag(number),
+            Context::Gps => tiff.read_directory_tags(gps.as_ref()?).find_tag(number),
+            _ => tiff.find_tag(number),
+        };
+        match value.ok()?? {
+            TiffValue::Ascii(text) => Some(Value::Text(text.into_bytes())),
+            TiffValue::List(values) => values
+                .iter()
+                .map(number_of)
+                .collect::<Option<_>>()
+                .map(Value::Numbers),
+            value => Some(Value::Numbers(vec![number_of(&value)?])),
+        }
+    })
+}
+
+fn number_of(value: &TiffValue) -> Option<f64> {
+    match value {
+        TiffValue::Rational(over, under) => Some(f64::from(*over) / f64::from(*under)),
+        value => value.clone().into_u32().ok().map(f64::from),
+    }
+}
+
+/// What the tags say.
+fn describe(mut look_up: impl FnMut(Tag) -> Option<Value>) -> Exif {
+    let (make, model) = (text(look_up(Tag::Make)), text(look_up(Tag::Model)));
     let camera = match (make, model) {
         // Many models begin with their maker.
         (Some(make), Some(model)) if model.starts_with(&make) => Some(model),
         (Some(make), Some(model)) => Some(format!("{make} {model}")),
         (make, model) => make.or(model),
     };
-    let taken = tiff.text(&own, 0x9003).or_else(|| tiff.text(&main, 0x0132));
+    let taken = text(look_up(Tag::DateTimeOriginal)).or_else(|| text(look_up(Tag::DateTime)));
 
-    let place = |tiff: &mut Tiff, tag: u16, negative: &str, most: f64| {
-        let [degrees, minutes, seconds] = tiff.ratios(&gps, tag)?;
+    let mut angle = |tag: Tag, reference: Tag, negative: &str, most: f64| {
+        let [degrees, minutes, seconds] = numbers(look_up(tag))?;
         let size = degrees + minutes / 60.0 + seconds / 3600.0;
-        let sign = tiff.text(&gps, tag - 1)?;
+        let sign = text(look_up(reference))?;
         (size <= most).then_some(if sign == negative { -size } else { size })
     };
-
-    let latitude = place(&mut tiff, 2, "S", 90.0);
-    let longitude = place(&mut tiff, 4, "W", 180.0);
-    let is_below = tiff.byte(&gps, 5) == Some(1);
-    let altitude = tiff.ratios::<1>(&gps, 6).map(|[a]| if is_below { -a } else { a });
-    Some(Exif {
+    let latitude = angle(Tag::GPSLatitude, Tag::GPSLatitudeRef, "S", 90.0);
+    let longitude = angle(Tag::GPSLongitude, Tag::GPSLongitudeRef, "W", 180.0);
+    let is_below = numbers(look_up(Tag::GPSAltitudeRef)) == Some([1.0]);
+    let altitude = numbers(look_up(Tag::GPSAltitude)).map(|[a]| if is_below { -a } else { a });
+    let mut length = |tag: Tag| numbers(look_up(tag)).map(|[f]| f).filter(|f| *f > 0.0);
+    Exif {
         camera,
         taken: taken.and_then(|text| date(&text)),
-        focal_mm: tiff.ratios::<1>(&own, 0x920a).map(|[f]| f).filter(|f| *f > 0.0),
-        focal_35_mm: tiff.short(&own, 0xa405).filter(|f| *f > 0).map(f64::from),
+        focal_mm: length(Tag::FocalLength),
+        focal_35_mm: length(Tag::FocalLengthIn35mmFilm),
         position: latitude.zip(longitude).map(|(a, b)| [a, b]),
         altitude_m: altitude,
-    })
-}
-
-/// Where the TIFF data of a JPEG begin.
-fn exif_segment(file: &mut BufReader<File>) -> Option<u64> {
-    loop {
-        let mut head = [0; 4];
-        file.read_exact(&mut head).ok()?;
-        let [0xff, marker, high, low] = head else {
-            return None;
-        };
-        let length = u16::from_be_bytes([high, low]).checked_sub(2)?;
-        // The image itself follows: no more segments.
-        if marker == 0xda {
-            return None;
-        }
-        let start = file.stream_position().ok()?;
-        let mut name = [0; 6];
-        if marker == 0xe1 && length > 6 && file.read_exact(&mut name).is_ok() && &name == b"Exif\0\0" {
-            return Some(start + 6);
-        }
-        file.seek(SeekFrom::Start(start + u64::from(length))).ok()?;
     }
 }
 
-/// Data in the form of a TIFF file, which begin somewhere in another.
-struct Tiff {
-    file: BufReader<File>,
-    base: u64,
-    is_little: bool,
+fn text(value: Option<Value>) -> Option<String> {
+    let Value::Text(bytes) = value? else {
+        return None;
+    };
+    let text: String = String::from_utf8_lossy(&bytes)
+        .chars()
+        .filter(|c| !c.is_control())
+        .collect();
+    Some(text.trim().to_owned()).filter(|text| !text.is_empty())
 }
 
-struct Entry {
-    tag: u16,
-    kind: u16,
-    count: u32,
-    /// Where its value, or the place of its value, stands.
-    place: u64,
-}
-
-impl Tiff {
-    fn open(file: BufReader<File>, base: u64) -> Option<Self> {
-        let mut tiff = Self {
-            file,
-            base,
-            is_little: true,
-        };
-        match tiff.bytes::<4>(0)? {
-            [b'I', b'I', 42, 0] => Some(tiff),
-            [b'M', b'M', 0, 42] => {
-                tiff.is_little = false;
-                Some(tiff)
-            }
-            _ => None,
-        }
-    }
-
-    fn bytes<const N: usize>(&mut self, place: u64) -> Option<[u8; N]> {
-        let mut bytes = [0; N];
-        self.file
-            .seek(SeekFrom::Start(self.base.checked_add(place)?))
-            .ok()?;
-        self.file.read_exact(&mut bytes).ok()?;
-        Some(bytes)
-    }
-
-    /// A whole number of 2 or 4 bytes.
-    fn number(&mut self, place: u64, size: usize) -> Option<u64> {
-        let [a, b, c, d] = match size {
-            2 => self.bytes::<2>(place).map(|[a, b]| [a, b, 0, 0])?,
-            _ => self.bytes::<4>(place)?,
-        };
-        Some(match (self.is_little, size) {
-            (true, _) => u64::from(u32::from_le_bytes([a, b, c, d])),
-            (false, 2) => u64::from(u16::from_be_bytes([a, b])),
-            (false, _) => u64::from(u32::from_be_bytes([a, b, c, d])),
-        })
-    }
-
-    fn entries(&mut self, place: u64) -> Vec<Entry> {
-        let count = self.number(place, 2).unwrap_or(0).min(u64::from(MOST_ENTRIES));
-        let starts = (0..count).map(|k| place + 2 + 12 * k);
-        let read = |start| {
-            Some(Entry {
-                tag: self.number(start, 2)? as u16,
-                kind: self.number(start + 2, 2)? as u16,
-                count: self.number(start + 4, 4)? as u32,
-                place: start + 8,
-            })
-        };
-        starts.map_while(read).collect()
-    }
-
-    /// Where the values of an entry begin: more than four bytes stand elsewhere.
-    fn values(&mut self, entries: &[Entry], tag: u16, kind: u16, bytes: u64) -> Option<(u64, u64)> {
-        let entry = entries.iter().find(|e| e.tag == tag && e.kind == kind)?;
-        let count = u64::from(entry.count);
-        let place = match count * bytes {
-            0..=4 => entry.place,
-            _ => self.number(entry.place, 4)?,
-        };
-        Some((place, count))
-    }
-
-    fn text(&mut self, entries: &[Entry], tag: u16) -> Option<String> {
-        let (place, count) = self.values(entries, tag, 2, 1)?;
-        let mut bytes = vec![0; count.min(MOST_BYTES) as usize];
-        self.file
-            .seek(SeekFrom::Start(self.base.checked_add(place)?))
-            .ok()?;
-        self.file.read_exact(&mut bytes).ok()?;
-        let end = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
-        let text = String::from_utf8_lossy(&bytes[..end]);
-        let text: String = text.chars().filter(|c| !c.is_control()).collect();
-        Some(text.trim().to_owned()).filter(|t| !t.is_empty())
-    }
-
-    fn byte(&mut self, entries: &[Entry], tag: u16) -> Option<u8> {
-        let (place, _) = self.values(entries, tag, 1, 1)?;
-        self.bytes::<1>(place).map(|[byte]| byte)
-    }
-
-    fn short(&mut self, entries: &[Entry], tag: u16) -> Option<u16> {
-        let (place, _) = self.values(entries, tag, 3, 2)?;
-        self.number(place, 2).map(|n| n as u16)
-    }
-
-    fn ratios<const N: usize>(&mut self, entries: &[Entry], tag: u16) -> Option<[f64; N]> {
-        let (place, count) = self.values(entries, tag, 5, 8)?;
-        if count < N as u64 {
-            return None;
-        }
-        let mut values = [0.0; N];
-        for (k, value) in (0..).zip(&mut values) {
-            let at = place + 8 * k;
-            *value = self.number(at, 4)? as f64 / self.number(at + 4, 4)? as f64;
-        }
-        values.iter().all(|v| v.is_finite()).then_some(values)
-    }
+/// The first N numbers; `None` where one of them is not finite.
+fn numbers<const N: usize>(value: Option<Value>) -> Option<[f64; N]> {
+    let Value::Numbers(all) = value? else {
+        return None;
+    };
+    let first = *all.first_chunk::<N>()?;
+    first.iter().all(|v| v.is_finite()).then_some(first)
 }
 
 /// `2025:04:12 09:31:02` as a date is written elsewhere; `None` for a clock that was never set.
 fn date(text: &str) -> Option<String> {
-    let (day, time) = text.split_once(' ')?;
-    let is_sound = day.len() == 10 && day.bytes().any(|b| matches!(b, b'1'..=b'9'));
-    is_sound.then(|| format!("{} {time}", day.replace(':', "-")))
+    let date = DateTime::from_ascii(text.as_bytes()).ok()?;
+    (date.year > 0).then(|| date.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_that_was_never_set_gives_no_date() {
+        assert_eq!(
+            date("2025:04:12 09:31:02").as_deref(),
+            Some("2025-04-12 09:31:02")
+        );
+        for text in [
+            "0000:00:00 00:00:00",
+            "    :  :     :  :  ",
+            "2025:04:12",
+            "yesterday",
+        ] {
+            assert_eq!(date(text), None, "{text}");
+        }
+    }
 }
