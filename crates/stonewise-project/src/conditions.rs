@@ -1,12 +1,12 @@
 //! The file of conditions: dates with levels, temperatures and what else was read.
 
 use crate::dated_csv::DatedCsv;
-use crate::day::day_of;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::Result;
 use stonewise_base::messages::Said;
 use stonewise_base::messages::notices::{CONDITION_AFTER, CONDITION_BEFORE, CONDITION_BETWEEN};
+use stonewise_results::calendar::day_of;
 
 /// Readings by the name of their column.
 #[derive(Clone, Debug)]

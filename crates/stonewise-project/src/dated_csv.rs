@@ -1,8 +1,8 @@
 //! CSV files of readings: a first line that names the columns, one of them `date`.
 
-use crate::day::day_of;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::{Error, Result};
+use stonewise_results::calendar::day_of;
 
 /// A file of readings, cell by cell.
 pub(crate) struct DatedCsv {

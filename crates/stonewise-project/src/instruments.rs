@@ -1,11 +1,11 @@
 //! Files of other instruments: pendulums, targets, levelling.
 
 use crate::dated_csv::{DatedCsv, DatedRow};
-use crate::day::day_of;
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::Result;
+use stonewise_results::calendar::day_of;
 
 /// Columns that a file has beside those of the axes.
 const PLACE: [&str; 5] = ["name", "x", "y", "z", "date"];

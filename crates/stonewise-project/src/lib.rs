@@ -17,7 +17,6 @@
 pub mod check;
 mod conditions;
 mod dated_csv;
-mod day;
 pub mod edits;
 mod init;
 mod instruments;
@@ -30,7 +29,6 @@ pub mod sources;
 mod split;
 
 pub use conditions::{ConditionsAt, ConditionsFile};
-pub use day::{DAYS_A_YEAR, day_of};
 pub use init::{Initialised, Proposal, init, propose};
 pub use instruments::{AxisMotion, Instrument, InstrumentFile, ReadingGap};
 pub use project_type::{Epoch, PhotoFiles, Project};

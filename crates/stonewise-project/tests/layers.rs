@@ -2,8 +2,7 @@
 //! other in a circle.
 
 /// Modules from the bottom up; those on one line do not use each other.
-const LAYERS: [&[&str]; 6] = [
-    &["day"],
+const LAYERS: [&[&str]; 5] = [
     &["dated_csv"],
     &["conditions", "edits", "init", "instruments", "sources"],
     &["project_type"],

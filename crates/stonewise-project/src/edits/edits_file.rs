@@ -11,6 +11,7 @@ use stonewise_base::files::write_text;
 use stonewise_core::geometry::is_simple;
 use stonewise_core::transfer::LabelEdit;
 use stonewise_results::Facade;
+use stonewise_results::calendar::day_of;
 
 /// Version of the layout.
 const FORMAT: u32 = 1;
@@ -216,13 +217,7 @@ impl Edit {
                 ));
             }
         }
-        let digits = |text: Option<&str>| text.is_some_and(|t| t.bytes().all(|b| b.is_ascii_digit()));
-        let day = self.when.get(..10).unwrap_or("");
-        let is_date = digits(day.get(..4))
-            && digits(day.get(5..7))
-            && digits(day.get(8..10))
-            && day.get(4..5) == Some("-")
-            && day.get(7..8) == Some("-");
+        let is_date = day_of(self.when.get(..10).unwrap_or("")).is_some();
         (!is_date).then(|| format!("\"when\" is {:?}: write a date as YYYY-MM-DD", self.when))
     }
 }

@@ -1,11 +1,11 @@
 //! Which epoch comes first.
 
 use super::epoch::Found;
-use crate::day::day_of;
 use std::path::Path;
 use stonewise_io::cloud::{Created, cloud_date};
 use stonewise_io::exif::read_exif;
 use stonewise_io::image_io::photos_in;
+use stonewise_results::calendar::day_of;
 
 /// Words in names of epochs, in order of time.
 const WORDS: [&[&str]; 7] = [

@@ -4,7 +4,7 @@ use crate::texts::Texts;
 use std::fmt::Write;
 use stonewise_base::thresholds::Levels;
 use stonewise_figure::{Axes, Axis, escape};
-use stonewise_results::calendar::days_from_civil;
+use stonewise_results::calendar::year_of;
 use stonewise_results::records::{ConditionRecord, CurvePoint, EstimateRecord, ZoneTrend};
 
 /// Width of the picture, pixels.
@@ -229,15 +229,6 @@ fn dots(axes: &Axes, points: &[[f64; 2]]) -> String {
     })
 }
 
-/// The year of an ISO date with the part of it that has passed.
-fn year_of(date: &str) -> Option<f64> {
-    let mut parts = date.get(..10)?.split('-').map(|p| p.parse::<i64>().ok());
-    let (year, month, day) = (parts.next()??, parts.next()??, parts.next()??);
-    let passed = days_from_civil(year, month, day) - days_from_civil(year, 1, 1);
-    let length = days_from_civil(year + 1, 1, 1) - days_from_civil(year, 1, 1);
-    Some(year as f64 + passed as f64 / length as f64)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -317,7 +308,5 @@ mod tests {
             .collect();
         assert_eq!(xs.len(), 4);
         assert!(xs.iter().all(|x| *x == xs[0]), "{xs:?}");
-        assert!((year_of("2024-07-02").unwrap() - 2024.5).abs() < 1e-12);
-        assert_eq!(year_of("soon"), None);
     }
 }

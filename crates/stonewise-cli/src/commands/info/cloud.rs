@@ -1,12 +1,12 @@
 //! `info` of a cloud.
 
 use super::described::Described;
-use super::gps_time::date_of;
 use crate::counted::counted;
 use anyhow::Result;
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
+use stonewise::results::calendar::date_of_gps;
 use stonewise_core::geometry::Bounds;
 use stonewise_io::cameras::{E57ImageCounts, count_e57_images};
 use stonewise_io::cloud::{Clock, CloudDetails, CloudFormat, Created, Rounding, SourcePoints, cloud_details};
@@ -108,7 +108,7 @@ fn text(details: &CloudDetails) -> String {
             format!(", scanner at ({:.3}, {:.3}, {:.3})", p.x, p.y, p.z)
         });
         let sensor = scan.sensor.as_ref().map_or(String::new(), |s| format!(", {s}"));
-        let begun = scan.begun_s.and_then(date_of);
+        let begun = scan.begun_s.and_then(date_of_gps);
         let begun = begun.map_or(String::new(), |date| format!(", begun {date} GPS time"));
         let points = counted(scan.records, "point");
         let name = scan.name.strip_prefix("scan ").unwrap_or(&scan.name);
@@ -152,7 +152,7 @@ fn json(details: &CloudDetails) -> serde_json::Value {
     let named = details.crs.as_deref().and_then(Crs::parse);
     let scans = details.scans.iter().map(|scan| {
         let scanner = scan.origin.map(|p| [p.x, p.y, p.z]);
-        let begun = scan.begun_s.and_then(date_of);
+        let begun = scan.begun_s.and_then(date_of_gps);
         json!({
             "name": scan.name, "records": scan.records, "scanner": scanner, "sensor": scan.sensor, "begun": begun,
         })
@@ -192,7 +192,7 @@ fn json(details: &CloudDetails) -> serde_json::Value {
 fn written(details: &CloudDetails) -> Option<String> {
     match details.created.as_ref()? {
         Created::Day(day) => Some(day.clone()),
-        Created::Gps(seconds) => date_of(*seconds).map(|date| format!("{date} GPS time")),
+        Created::Gps(seconds) => date_of_gps(*seconds).map(|date| format!("{date} GPS time")),
     }
 }
 
@@ -231,7 +231,7 @@ fn rounding(rounding: &Rounding) -> Option<String> {
 fn dates(clock: Clock, times: [f64; 2]) -> Option<[String; 2]> {
     match clock {
         Clock::AdjustedGps => {
-            let [first, last] = times.map(|t| date_of(t + ADJUSTED_S));
+            let [first, last] = times.map(|t| date_of_gps(t + ADJUSTED_S));
             Some([first?, last?])
         }
         Clock::GpsWeek | Clock::Unknown => None,

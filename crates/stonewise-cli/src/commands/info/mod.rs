@@ -2,7 +2,6 @@
 
 mod cloud;
 mod described;
-mod gps_time;
 mod pictures;
 
 use crate::args::InfoArgs;

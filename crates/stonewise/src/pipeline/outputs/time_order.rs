@@ -1,7 +1,8 @@
 //! Epochs in the order of time, and what each brings into the error of a pair.
 
-use crate::project::{Project, day_of};
+use crate::project::Project;
 use crate::results::StoneRow;
+use crate::results::calendar::day_of;
 use crate::results::records::EstimatorRecord;
 use stonewise_core::epoch::EpochId;
 

@@ -1,7 +1,7 @@
 //! What zones and the wall do over time: their path, the model between the epochs, and the conditions beside it.
 
-use crate::project::{ConditionsFile, DAYS_A_YEAR, Project};
-use crate::results::calendar::civil_from_days;
+use crate::project::{ConditionsFile, Project};
+use crate::results::calendar::{DAYS_A_YEAR, date_of};
 use crate::results::records::{
     ConditionRecord, CurvePoint, EstimateRecord, PathPoint, SeasonRecord, ZoneTrend,
 };
@@ -136,7 +136,7 @@ impl TimedSeries<'_> {
         let count = ((end - first) / step).floor() as usize;
         let day = |k: usize| {
             let day = (first + k as f64 * step).floor();
-            let date = iso(day);
+            let date = date_of(day).unwrap_or_default();
             let conditions = self.project.conditions.as_ref();
             let values = conditions.map_or_else(BTreeMap::new, |file: &ConditionsFile| file.at(&date).values);
             let at = under(&values, &date, Some(day));
@@ -187,10 +187,4 @@ fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
         [low.min(v), high.max(v)]
     })
-}
-
-/// The date of a day.
-fn iso(day: f64) -> String {
-    let (year, month, day) = civil_from_days(day as i64);
-    format!("{year:04}-{month:02}-{day:02}")
 }
