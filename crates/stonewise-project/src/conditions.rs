@@ -29,29 +29,31 @@ pub struct ConditionsAt {
 }
 
 impl ConditionsFile {
-    /// Reads a CSV file whose first line names the columns, `date` first among equals, and whose cells are numbers or
-    /// empty.
+    /// Reads a [CSV file](stonewise_io::table::CsvFile) whose first line names the columns, `date` first among equals,
+    /// and whose cells are numbers or empty.
     ///
     /// # Errors
     /// With the line: no dates, a cell that is no number, dates that go back.
     pub fn read(path: &Path, longest_gap_days: f64) -> Result<Self> {
-        let file = DatedCsv::read(path, "reading the file of conditions")?;
+        let table = DatedCsv::read(path, "reading the file of conditions")?;
         let mut columns: BTreeMap<String, Vec<(f64, f64)>> = BTreeMap::new();
         let mut before = f64::NEG_INFINITY;
-        for row in &file.rows {
+        for row in table.rows() {
+            let row = row?;
             if row.day < before {
                 let message = format!("{} stands after a later date: sort the lines by date", row.date);
-                return Err(file.error(row.line, message));
+                return Err(row.error(message));
             }
             before = row.day;
-            for (column, name) in file.head.iter().enumerate().filter(|(_, name)| *name != "date") {
-                if let Some(value) = file.number(row, column)? {
+            let head = table.file.head().iter().enumerate();
+            for (column, name) in head.filter(|(_, name)| *name != "date") {
+                if let Some(value) = row.number(column)? {
                     columns.entry(name.clone()).or_default().push((row.day, value));
                 }
             }
         }
         if columns.is_empty() {
-            return Err(file.error(1, "no readings: add a column, such as reservoir_level_m"));
+            return Err(table.error("no readings: add a column, such as reservoir_level_m"));
         }
         Ok(Self {
             path: path.to_path_buf(),
@@ -138,6 +140,17 @@ mod tests {
     }
 
     #[test]
+    fn what_a_german_spreadsheet_writes_says_the_same() {
+        let german = "\u{feff}date;reservoir_level_m;\"temperature_c\"\r\n01.04.2025;312,0;\r\n05.04.2025 00:00;314;8,0\r\n\r\n\
+                      20.05.2025;300,0;20\r\n21.05.2025;301;\r\n;;\r\n";
+        let [english, german] = [LEVELS, german].map(|text| read(text).unwrap());
+        assert_eq!(english.columns, german.columns);
+        // A quoted cell with a comma in it.
+        let quoted = read("date,\"level, m\"\n2025-04-01,312\n").unwrap();
+        assert_eq!(quoted.at("2025-04-01").values["level, m"], 312.0);
+    }
+
+    #[test]
     fn mistakes_are_named_with_line_and_fix() {
         for (text, message) in [
             (
@@ -151,8 +164,12 @@ mod tests {
                 "levels.csv:3: a: \"x\" is no number",
             ),
             (
-                "date,a\n01.02.2025,1\n",
-                "levels.csv:2: \"01.02.2025\" is no date",
+                "date,a\n31.02.2025,1\n",
+                "levels.csv:2: \"31.02.2025\" is no date",
+            ),
+            (
+                "date;a\n2025-01-01;\"1\n",
+                "levels.csv:2: a quote is opened and never closed",
             ),
             (
                 "date,a\n2025-01-01,1,5\n",

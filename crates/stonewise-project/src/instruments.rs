@@ -70,8 +70,8 @@ pub enum ReadingGap {
 }
 
 impl InstrumentFile {
-    /// Reads a CSV file with the columns name, x, y, z, date, and for at least one axis the reading and its standard
-    /// deviation: dx and sd_x, dy and sd_y, dz and sd_z; metres, in any order of lines.
+    /// Reads a [CSV file](stonewise_io::table::CsvFile) with the columns name, x, y, z, date, and for at least one axis
+    /// the reading and its standard deviation: dx and sd_x, dy and sd_y, dz and sd_z; metres, in any order of lines.
     ///
     /// # Errors
     /// With the line: a column that is missing or unknown, a cell that is no number, a reading without a standard
@@ -80,15 +80,15 @@ impl InstrumentFile {
         let file = DatedCsv::read(path, "reading the file of instruments")?;
         let columns = Columns::of(&file)?;
         let mut instruments: BTreeMap<String, Instrument> = BTreeMap::new();
-        for row in &file.rows {
-            columns.add(&file, row, &mut instruments)?;
+        for row in file.rows() {
+            columns.add(&row?, &mut instruments)?;
         }
         let mut instruments: Vec<Instrument> = instruments.into_values().collect();
         for axis in instruments.iter_mut().flat_map(|i| &mut i.axes) {
             axis.sort_by(|a, b| a.day.total_cmp(&b.day));
         }
         if instruments.is_empty() {
-            return Err(file.error(1, "no readings: add a line for each instrument and date"));
+            return Err(file.error("no readings: add a line for each instrument and date"));
         }
         Ok(Self {
             path: path.to_path_buf(),
@@ -174,27 +174,27 @@ struct Columns {
 
 impl Columns {
     fn of(file: &DatedCsv) -> Result<Self> {
+        let place = |name: &str| file.file.column(name);
         let known = |name: &String| PLACE.contains(&name.as_str()) || AXES.concat().contains(&name.as_str());
-        if let Some(other) = file.head.iter().find(|name| !known(name)) {
+        if let Some(other) = file.file.head().iter().find(|name| !known(name)) {
             let message = format!(
                 "no column may be named {other:?}: they are name, x, y, z, date, dx, dy, dz, sd_x, sd_y, sd_z"
             );
-            return Err(file.error(1, message));
+            return Err(file.error(message));
         }
         let required = |name: &str| {
-            file.place(name)
-                .ok_or_else(|| file.error(1, format!("the column `{name}` is missing: add it")))
+            place(name).ok_or_else(|| file.error(format!("the column `{name}` is missing: add it")))
         };
-        let axis = |[value, sd]: [&str; 2]| match (file.place(value), file.place(sd)) {
+        let axis = |[value, sd]: [&str; 2]| match (place(value), place(sd)) {
             (Some(value), Some(sd)) => Ok(Some([value, sd])),
             (None, None) => Ok(None),
-            (Some(_), None) => Err(file.error(1, format!("`{value}` needs the column `{sd}`: add it"))),
-            (None, Some(_)) => Err(file.error(1, format!("`{sd}` needs the column `{value}`: add it"))),
+            (Some(_), None) => Err(file.error(format!("`{value}` needs the column `{sd}`: add it"))),
+            (None, Some(_)) => Err(file.error(format!("`{sd}` needs the column `{value}`: add it"))),
         };
         let axes = [axis(AXES[0])?, axis(AXES[1])?, axis(AXES[2])?];
         if axes.iter().all(Option::is_none) {
             let message = "nothing is measured: add one of dx, dy and dz with its standard deviation sd_x, sd_y or sd_z";
-            return Err(file.error(1, message));
+            return Err(file.error(message));
         }
         Ok(Self {
             name: required("name")?,
@@ -204,24 +204,18 @@ impl Columns {
     }
 
     /// Adds the readings of a line.
-    fn add(
-        &self,
-        file: &DatedCsv,
-        row: &DatedRow,
-        instruments: &mut BTreeMap<String, Instrument>,
-    ) -> Result<()> {
-        let name = row.text(self.name);
+    fn add(&self, row: &DatedRow<'_>, instruments: &mut BTreeMap<String, Instrument>) -> Result<()> {
+        let name = row.cells.text(self.name);
         if name.is_empty() {
-            return Err(file.error(row.line, "an instrument needs a name"));
+            return Err(row.error("an instrument needs a name"));
         }
         let coordinate = |axis: usize| {
-            let found = file.number(row, self.place[axis])?;
+            let found = row.number(self.place[axis])?;
             found.ok_or_else(|| {
                 let axis = PLACE[1 + axis];
-                file.error(
-                    row.line,
-                    format!("{name}: {axis} is empty: give the place of the instrument"),
-                )
+                row.error(format!(
+                    "{name}: {axis} is empty: give the place of the instrument"
+                ))
             })
         };
         let place = Point3::new(coordinate(0)?, coordinate(1)?, coordinate(2)?);
@@ -233,28 +227,28 @@ impl Columns {
         if (place - instrument.place).norm() > SAME_PLACE_M {
             let message =
                 format!("{name} stands at another place in an earlier line: give each place its own name");
-            return Err(file.error(row.line, message));
+            return Err(row.error(message));
         }
         for (axis, columns) in self.axes.iter().enumerate() {
             let Some([of_value, of_sd]) = *columns else {
                 continue;
             };
-            let Some(value_m) = file.number(row, of_value)? else {
+            let Some(value_m) = row.number(of_value)? else {
                 continue;
             };
             let [value, sd] = AXES[axis];
-            let sd_m = file.number(row, of_sd)?.filter(|sd| *sd >= 0.0).ok_or_else(|| {
+            let sd_m = row.number(of_sd)?.filter(|sd| *sd >= 0.0).ok_or_else(|| {
                 let message = format!(
                     "{name}: {value} needs its standard deviation: give {sd} in metres, 0 or more, or leave {value} empty"
                 );
-                file.error(row.line, message)
+                row.error(message)
             })?;
             if instrument.axes[axis].iter().any(|r| r.day == row.day) {
                 let message = format!(
                     "{name} has two readings of {}: remove one, or add the time",
                     row.date
                 );
-                return Err(file.error(row.line, message));
+                return Err(row.error(message));
             }
             instrument.axes[axis].push(Reading {
                 day: row.day,

@@ -1,9 +1,9 @@
 //! The M3C2 core points, as the report reads them.
 
 use nalgebra::{Point3, Vector3};
-use std::io::{BufRead, BufReader};
 use std::path::Path;
 use stonewise_base::error::Error;
+use stonewise_io::table::{CsvError, CsvFile};
 
 /// A core point with its distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,28 +34,18 @@ pub(super) struct CorePoints {
 /// # Errors
 /// The file cannot be read, lacks a column or holds something that is no number.
 pub(super) fn read_distance_points(path: &Path) -> Result<CorePoints, Error> {
-    let file = match std::fs::File::open(path) {
-        Ok(file) => file,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(CorePoints::default()),
-        Err(e) => return Err(Error::io("reading the distances", path)(e)),
+    let Some(file) = read_csv(path)? else {
+        return Ok(CorePoints::default());
     };
-    let content = |message: String| Error::Results {
-        path: path.into(),
-        message,
-    };
-    let mut lines = BufReader::new(file).lines();
-    let header = lines
-        .next()
-        .transpose()
-        .map_err(Error::io("reading the distances", path))?
-        .unwrap_or_default();
-    let names: Vec<&str> = header.trim().split(',').collect();
+    let damaged = |e: CsvError| Error::results(path, e.said());
     let find = |wanted: &[&str]| {
-        names
+        file.head()
             .iter()
             .position(|n| wanted.iter().any(|w| n.eq_ignore_ascii_case(w)))
     };
-    let need = |wanted: &[&str]| find(wanted).ok_or_else(|| content(format!("no column {:?}", wanted[0])));
+    let need = |wanted: &[&str]| {
+        find(wanted).ok_or_else(|| Error::results(path, format!("no column {:?}", wanted[0])))
+    };
     let place = [need(&["x"])?, need(&["y"])?, need(&["z"])?];
     let (distance, limit) = (need(&["m3c2_distance"])?, need(&["m3c2_uncertainty"])?);
     let normal = [
@@ -65,15 +55,9 @@ pub(super) fn read_distance_points(path: &Path) -> Result<CorePoints, Error> {
     ];
     let counts = [find(&["m3c2_count1"]), find(&["m3c2_count2"])];
     let mut points = CorePoints::default();
-    for (number, line) in lines.enumerate() {
-        let line = line.map_err(Error::io("reading the distances", path))?;
-        let cells: Vec<&str> = line.trim().split(',').collect();
-        let value = |column: usize| match cells.get(column) {
-            None | Some(&"") => Ok(f64::NAN),
-            Some(cell) => cell
-                .parse()
-                .map_err(|_| content(format!("line {}: {cell:?} is no number", number + 2))),
-        };
+    for row in file.rows() {
+        let row = row.map_err(damaged)?;
+        let value = |column: usize| row.number(column).map(|v| v.unwrap_or(f64::NAN)).map_err(damaged);
         let position = Point3::new(value(place[0])?, value(place[1])?, value(place[2])?);
         let distance_m = value(distance)?;
         if !distance_m.is_finite() {
@@ -97,6 +81,21 @@ pub(super) fn read_distance_points(path: &Path) -> Result<CorePoints, Error> {
         });
     }
     Ok(points)
+}
+
+/// A CSV file of the results; `None` where there is no such file.
+///
+/// # Errors
+/// The file cannot be read, or is damaged.
+pub(super) fn read_csv(path: &Path) -> Result<Option<CsvFile>, Error> {
+    match std::fs::read(path) {
+        Ok(bytes) => {
+            let file = CsvFile::parse(path, bytes).map_err(|e| Error::results(path, e.said()))?;
+            Ok(Some(file))
+        }
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(Error::io("reading results", path)(e)),
+    }
 }
 
 #[cfg(test)]

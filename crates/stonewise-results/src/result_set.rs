@@ -1,6 +1,6 @@
 //! All that a report is made of.
 
-use super::change_points::{DistancePoint, read_distance_points};
+use super::change_points::{DistancePoint, read_csv, read_distance_points};
 use super::names::{CARRY_AUDIT, EDITS_AUDIT, FACADE, INSTRUMENTS, PairFile, RUN, TRENDS, VERDICT, audit};
 use super::outlines::{StoneOutline, read_outlines};
 use super::records::{
@@ -279,39 +279,41 @@ fn read_decisions(dir: &Path) -> Result<Vec<Vec<Vec<String>>>, Error> {
 
 /// Rows of a CSV file, the head first, as cells; `None` where there is no such file.
 fn read_rows(path: &Path) -> Result<Option<Vec<Vec<String>>>, Error> {
-    match std::fs::read_to_string(path) {
-        Ok(text) => Ok(Some(text.lines().map(cells).collect())),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(e) => Err(Error::io("reading results", path)(e)),
+    let Some(file) = read_csv(path)? else {
+        return Ok(None);
+    };
+    let mut rows = vec![file.head().to_vec()];
+    for row in file.rows() {
+        let row = row.map_err(|e| Error::results(path, e.said()))?;
+        rows.push((0..file.head().len()).map(|i| row.text(i).to_owned()).collect());
     }
-}
-
-/// Cells of a line of CSV; quoted cells may hold commas and doubled quotes (RFC 4180).
-fn cells(line: &str) -> Vec<String> {
-    let (mut all, mut cell, mut quoted) = (Vec::new(), String::new(), false);
-    let mut rest = line.chars().peekable();
-    while let Some(c) = rest.next() {
-        match c {
-            '"' if quoted && rest.peek() == Some(&'"') => {
-                rest.next();
-                cell.push('"');
-            }
-            '"' => quoted = !quoted,
-            ',' if !quoted => all.push(std::mem::take(&mut cell)),
-            c => cell.push(c),
-        }
-    }
-    all.push(cell);
-    all
+    Ok(Some(rows))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stonewise_io::table::{Table, write_csv};
 
     #[test]
-    fn quoted_cells_keep_their_commas() {
-        assert_eq!(cells(r#"a,"b, ""c""",,d"#), ["a", "b, \"c\"", "", "d"]);
-        assert_eq!(cells(""), [""]);
+    fn rows_are_those_that_were_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("audit.csv");
+        assert_eq!(read_rows(&path).unwrap(), None);
+        let mut table = Table::new();
+        let words = ["b, \"c\"", "", "=d"].map(str::to_owned).to_vec();
+        table.push("why, who", "", "text", words).unwrap();
+        table
+            .push("points", "", "number", vec![Some(1_u32), Some(2), None])
+            .unwrap();
+        write_csv(&path, &table, "", None).unwrap();
+        let expected = [["why, who", "points"], ["b, \"c\"", "1"], ["", "2"], ["'=d", ""]];
+        assert_eq!(read_rows(&path).unwrap().unwrap(), expected);
+        std::fs::write(&path, "a,b\n1\n").unwrap();
+        let damaged = read_rows(&path).unwrap_err().to_string();
+        assert!(
+            damaged.contains("line 2: 1 cells") && damaged.contains("audit.csv"),
+            "{damaged}"
+        );
     }
 }

@@ -13,6 +13,7 @@ use stonewise_core::evaluate::{
     score_against_truth, score_neighbours, score_rotations,
 };
 use stonewise_core::id::StoneId;
+use stonewise_io::table::{CsvError, CsvFile};
 
 /// Columns that a table of true stones must have.
 const NEEDED: [&str; 11] = [
@@ -73,19 +74,14 @@ pub(crate) fn outcome(row: &StoneRow, normal: Vector3<f64>, datum: Option<&Datum
 }
 
 fn read_truth(path: &Path) -> Result<Vec<TrueStone>> {
-    let text = fs::read_to_string(path).map_err(Error::io("reading", path))?;
+    let bytes = fs::read(path).map_err(Error::io("reading", path))?;
     let bad = |message: String| Error::Input {
         path: path.to_path_buf(),
         message,
     };
-    let mut lines = text
-        .lines()
-        .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty());
-    let names: Vec<&str> = lines
-        .next()
-        .map_or_else(Vec::new, |(_, l)| l.split(',').map(str::trim).collect());
-    let find = |name: &str| names.iter().position(|n| *n == name);
+    let in_table = |e: CsvError| bad(e.said());
+    let file = CsvFile::parse(path, bytes).map_err(in_table)?;
+    let find = |name: &str| file.column(name);
     if let Some(missing) = NEEDED.iter().find(|n| find(n).is_none()) {
         return Err(bad(format!("no column {missing:?} in the table of true stones")));
     }
@@ -93,18 +89,12 @@ fn read_truth(path: &Path) -> Result<Vec<TrueStone>> {
         Some(column) => vec![column],
         None => ["vis_tls", "vis_uav"].iter().filter_map(|n| find(n)).collect(),
     };
-    lines
-        .map(|(number, line)| {
-            let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+    file.rows()
+        .map(|row| {
+            let row = row.map_err(in_table)?;
             let at = |column: usize| {
-                let cell = cells.get(column).copied().unwrap_or("");
-                cell.parse::<f64>().map_err(|_| {
-                    bad(format!(
-                        "line {}: {cell:?} in column {} is no number",
-                        number + 1,
-                        names[column]
-                    ))
-                })
+                let number = row.number(column).map_err(in_table)?;
+                number.ok_or_else(|| in_table(row.error_in(column, "empty: give a number")))
             };
             let value = |name: &str, absent: f64| find(name).map_or(Ok(absent), at);
             let vector = |x, y, z, absent| {
@@ -142,6 +132,29 @@ mod tests {
         .unwrap();
         let stones = read_truth(&path).unwrap();
         stones.iter().map(|s| s.visible_share).collect()
+    }
+
+    #[test]
+    fn mistakes_are_named_with_line_and_column() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("stones.csv");
+        let row = "1".to_owned() + &";0,5".repeat(10);
+        let table = |row: &str| format!("\u{feff}{}\r\n{row}\r\n", NEEDED.join(";"));
+        fs::write(&path, table(&row)).unwrap();
+        assert_eq!(read_truth(&path).unwrap()[0].displacement, Vector3::repeat(0.5));
+        for (text, message) in [
+            (
+                table(&row.replacen("0,5", "x", 1)),
+                "line 2, column cx: \"x\" is no number",
+            ),
+            (table(&row.replacen("0,5", "", 1)), "line 2, column cx: empty"),
+            (table("1;2"), "line 2: 2 cells"),
+            ("stone_id,cx\n".to_owned(), "no column \"cy\""),
+        ] {
+            fs::write(&path, text).unwrap();
+            let found = read_truth(&path).unwrap_err().to_string();
+            assert!(found.contains(message) && found.contains("stones.csv"), "{found}");
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use stonewise_io::atomic::write_atomically;
-use stonewise_io::table::{Table, write_csv_metadata};
+use stonewise_io::table::{CsvError, CsvFile, CsvRow, Table, write_csv_metadata};
 
 /// A CSV that grows by a row at a time; its first column is the step.
 pub struct Curve {
@@ -31,10 +31,12 @@ impl Curve {
         };
         let names: Vec<&str> = columns.names().collect();
         let mut text = format!("{}\n", names.join(","));
-        for row in old.lines().skip(1) {
-            let step = row.split(',').next().and_then(|s| s.parse::<u64>().ok());
-            if step.is_some_and(|step| step <= steps) {
-                text += &format!("{row}\n");
+        let old = table(path, old)?;
+        // The last row of a training that was killed may be half a row.
+        for row in old.rows().flatten() {
+            if row.text(0).parse().is_ok_and(|step: u64| step <= steps) {
+                let cells: Vec<&str> = (0..old.head().len()).map(|i| row.text(i)).collect();
+                text += &format!("{}\n", cells.join(","));
             }
         }
         write_atomically(path, |partial| std::fs::write(partial, text))
@@ -65,12 +67,14 @@ impl Curve {
 /// The file cannot be read.
 pub fn read_curve(path: &Path) -> Result<Vec<Vec<f64>>, TrainError> {
     let text = std::fs::read_to_string(path).map_err(TrainError::io("reading the curve", path))?;
-    let row = |line: &str| {
-        line.split(',')
-            .map(|v| v.parse().ok())
-            .collect::<Option<Vec<f64>>>()
-    };
-    Ok(text.lines().skip(1).filter_map(row).collect())
+    let file = table(path, text)?;
+    let numbers = |row: CsvRow<'_>| (0..file.head().len()).map(|i| row.text(i).parse().ok()).collect();
+    Ok(file.rows().flatten().filter_map(numbers).collect())
+}
+
+fn table(path: &Path, text: String) -> Result<CsvFile, TrainError> {
+    let damaged = |e: CsvError| std::io::Error::new(std::io::ErrorKind::InvalidData, e.said());
+    CsvFile::parse(path, text).map_err(|e| TrainError::io("reading the curve", path)(damaged(e)))
 }
 
 #[cfg(test)]

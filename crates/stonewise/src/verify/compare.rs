@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 use serde_json::{Map, Value};
+use std::path::Path;
+use stonewise_io::table::{CsvError, CsvFile, CsvRow};
 
 /// How far two numbers may lie apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -205,26 +207,42 @@ fn deviations_of(name: &str, beside: &Map<String, Value>) -> f64 {
     products.next().unwrap_or(0.0)
 }
 
-/// Where two tables of text differ first by more than the tolerance of the column, in words.
+/// Where two tables of text differ first by more than the tolerance of the column, in words; what is wrong with one that
+/// is no table.
 pub(super) fn first_cell(a: &str, b: &str, tolerance: &dyn Fn(&str) -> Tolerance) -> Option<String> {
-    let head: Vec<&str> = a.lines().next().unwrap_or_default().split(',').collect();
+    first_of_cells(a, b, tolerance).unwrap_or_else(|e| Some(e.said()))
+}
+
+fn first_of_cells(
+    a: &str,
+    b: &str,
+    tolerance: &dyn Fn(&str) -> Tolerance,
+) -> Result<Option<String>, CsvError> {
+    let read = |text: &str| CsvFile::parse(Path::new(""), text);
+    let (a, b) = (read(a)?, read(b)?);
+    if a.head() != b.head() {
+        let [x, y] = [&a, &b].map(|table| table.head().join(","));
+        return Ok(Some(format!("line 1: {x:?} and {y:?}")));
+    }
     let value = |cell: &str| serde_json::from_str(cell).unwrap_or_else(|_| Value::from(cell));
-    let row = |line: &str| {
-        let cells = line.split(',').map(value);
-        Value::Object(head.iter().map(|name| (*name).to_owned()).zip(cells).collect())
+    let object = |row: &CsvRow<'_>| {
+        let cells = a.head().iter().enumerate();
+        Value::Object(cells.map(|(i, name)| (name.to_string(), value(row.text(i)))).collect())
     };
-    for (number, (x, y)) in (1..).zip(a.lines().zip(b.lines())).filter(|(_, (x, y))| x != y) {
-        let counts = [x, y].map(|line| line.split(',').count());
-        if counts[0] != counts[1] {
-            return Some(format!("line {number}: {} and {} cells", counts[0], counts[1]));
-        }
-        let difference = different_at(&format!("line {number}"), "", 0.0, &row(x), &row(y), tolerance);
+    let (mut of_a, mut of_b) = (a.rows(), b.rows());
+    for line in 2.. {
+        let difference = match (of_a.next().transpose()?, of_b.next().transpose()?) {
+            (Some(x), Some(y)) => {
+                different_at(&format!("line {line}"), "", 0.0, &object(&x), &object(&y), tolerance)
+            }
+            (None, None) => break,
+            _ => Some(format!("{} and {} rows", a.rows().count(), b.rows().count())),
+        };
         if difference.is_some() {
-            return difference;
+            return Ok(difference);
         }
     }
-    let rows = [a, b].map(|text| text.lines().count());
-    (rows[0] != rows[1]).then(|| format!("{} and {} lines", rows[0], rows[1]))
+    Ok(None)
 }
 
 #[cfg(test)]
