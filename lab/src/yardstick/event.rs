@@ -55,7 +55,7 @@ impl Event {
             Self::Masks => spoil(wall),
             Self::Corners => corners(wall),
             Self::Partners => partners(wall),
-            Self::Ivy(share) => change(wall, |_, p| {
+            Self::Ivy(share) => each(wall, &[1], |_, p| {
                 let covered = p.place.y < -0.4 && rng.random_range(0.0..1.0) < share;
                 p.place.x += if covered {
                     0.01 + 0.03 * normal(rng).abs()
@@ -69,7 +69,7 @@ impl Event {
                 let patches: Vec<[f64; 2]> = (0..4)
                     .map(|_| [rng.random_range(-1.2..1.0), rng.random_range(0.3..1.5)])
                     .collect();
-                change(wall, |_, p| {
+                each(wall, &[1], |_, p| {
                     let within = |at: &[f64; 2]| {
                         (0.0..0.3).contains(&(p.place.y - at[0]))
                             && (0.0..0.25).contains(&(p.place.z - at[1]))
@@ -101,48 +101,41 @@ impl Event {
             Self::Buttress(out_m, moved_m) => buttress(wall, out_m, moved_m),
             Self::ScanLines => {
                 let errors: Vec<[f64; 2]> = (0..2000).map(|_| [0.0; 2].map(|_| 8e-4 * normal(rng))).collect();
-                for (epoch, stones) in wall.epochs.iter_mut().enumerate() {
-                    for p in stones.values_mut().flatten() {
-                        let row = ((p.place.z + 1.0).max(0.0) / 0.007) as usize % errors.len();
-                        p.place.x += errors[row][epoch];
-                    }
-                }
+                each(wall, &[0, 1], |epoch, p| {
+                    let row = ((p.place.z + 1.0).max(0.0) / 0.007) as usize % errors.len();
+                    p.place.x += errors[row][epoch];
+                });
             }
             Self::OtherSensor => {
                 for points in wall.epochs[1].values_mut() {
                     points.retain(|p| p.place.y < 0.6 || rng.random_range(0.0..1.0) < 0.3);
                 }
-                change(wall, |_, p| {
+                each(wall, &[1], |_, p| {
                     if p.place.y >= 0.6 {
                         p.place.x += 0.008 * normal(rng);
                         p.source = 9;
                     }
                 });
             }
-            Self::Noise(sd_m) => {
-                for p in wall.epochs.iter_mut().flat_map(|e| e.values_mut()).flatten() {
-                    p.place.x += sd_m * normal(rng);
-                }
-            }
-            Self::Rounded(step_m) => {
-                for p in wall.epochs.iter_mut().flat_map(|e| e.values_mut()).flatten() {
-                    p.place = (p.place / step_m).map(f64::round) * step_m;
-                }
-            }
+            Self::Noise(sd_m) => each(wall, &[0, 1], |_, p| p.place.x += sd_m * normal(rng)),
+            Self::Rounded(step_m) => each(wall, &[0, 1], |_, p| {
+                p.place = (p.place / step_m).map(f64::round) * step_m;
+            }),
             Self::Merged => {
                 wall.has_times = [false; 2];
-                for p in wall.epochs.iter_mut().flat_map(|e| e.values_mut()).flatten() {
-                    p.source = 0;
-                }
+                each(wall, &[0, 1], |_, p| p.source = 0);
             }
         }
     }
 }
 
-/// Changes the points of the second epoch.
-fn change(wall: &mut Wall, mut to: impl FnMut(u32, &mut SurveyPoint)) {
-    for (id, points) in &mut wall.epochs[1] {
-        points.iter_mut().for_each(|p| to(*id, p));
+/// Changes the points of these epochs.
+fn each(wall: &mut Wall, epochs: &[usize], mut to: impl FnMut(usize, &mut SurveyPoint)) {
+    for &epoch in epochs {
+        wall.epochs[epoch]
+            .values_mut()
+            .flatten()
+            .for_each(|p| to(epoch, p));
     }
 }
 

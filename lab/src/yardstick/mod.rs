@@ -232,3 +232,18 @@ fn switch_off(names: &[String]) -> Outcome {
         false => Err("--off needs a build with `--features switches`".into()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use figures::columns;
+
+    #[test]
+    fn the_table_shows_figures_that_there_are() {
+        let known: Vec<String> = columns().into_iter().map(|c| c.0).collect();
+        for names in HEADS.iter().flat_map(|h| h.2.split(' ')) {
+            let name = names.replace('*', "95");
+            assert!(name == "surveys" || known.contains(&name), "{name}");
+        }
+    }
+}

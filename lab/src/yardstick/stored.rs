@@ -23,11 +23,12 @@ pub enum Stored {
         events: Vec<Event>,
         has_stable: bool,
     },
-    /// A real wall that stood still, by the results of a run; its outside, and a motion given to the second epoch.
+    /// A real wall that stood still, by the results of a run; its outside. `is_moved`: the second epoch is moved by 2 cm
+    /// along and 5 cm up, as in the paper.
     Real {
         name: &'static str,
         outward: [f64; 2],
-        moved_m: [f64; 3],
+        is_moved: bool,
     },
 }
 
@@ -35,15 +36,14 @@ impl Stored {
     /// All of them by name, and whether `quick` has them.
     pub fn all() -> Vec<(String, Self, bool)> {
         let mut list = Vec::new();
-        let sensors = [["tls", "tls"], ["uav", "uav"], ["tls", "uav"], ["uav", "tls"]];
-        for sensors in sensors {
+        for (by, sensors) in [
+            ("tls", ["tls", "tls"]),
+            ("uav", ["uav", "uav"]),
+            ("tls_uav", ["tls", "uav"]),
+            ("uav_tls", ["uav", "tls"]),
+        ] {
             let mut add = |happened: &str, is_moved, events, has_stable| {
                 let is_quick = is_moved && sensors[0] == sensors[1];
-                let by = if sensors[0] == sensors[1] {
-                    sensors[0].to_owned()
-                } else {
-                    sensors.join("_")
-                };
                 let dam = Self::Dam {
                     is_moved,
                     sensors,
@@ -57,31 +57,19 @@ impl Stored {
             add("combo-stable", true, Vec::new(), true);
             add("still", false, Vec::new(), false);
         }
-        // Outsides and motions as the surveys' own descriptions have them.
-        for (name, outward, moved_m) in [
-            (
-                "fountain",
-                [0.297_93, -0.954_56],
-                [0.019_091_6, 0.005_958_8, 0.05],
-            ),
-            (
-                "portal",
-                [-0.906_31, -0.422_62],
-                [0.008_452_4, -0.018_126_2, 0.05],
-            ),
-            (
-                "corner",
-                [-0.342_02, -0.939_69],
-                [0.018_793_9, -0.006_840_4, 0.05],
-            ),
+        // Outsides as the surveys' own descriptions have them.
+        for (name, outward) in [
+            ("fountain", [0.297_93, -0.954_56]),
+            ("portal", [-0.906_31, -0.422_62]),
+            ("corner", [-0.342_02, -0.939_69]),
         ] {
-            for (happened, moved_m) in [("still", [0.0; 3]), ("moved", moved_m)] {
+            for (happened, is_moved) in [("still", false), ("moved", true)] {
                 let real = Self::Real {
                     name,
                     outward,
-                    moved_m,
+                    is_moved,
                 };
-                list.push((format!("{name}-{happened}"), real, happened == "still"));
+                list.push((format!("{name}-{happened}"), real, !is_moved));
             }
         }
         list
@@ -109,10 +97,10 @@ impl Stored {
             Self::Real {
                 name,
                 outward,
-                moved_m,
+                is_moved,
             } => {
                 let results = results.ok_or("no results of a run: give them with --results FOLDER")?;
-                real(&Path::new(results).join(name), *outward, *moved_m)
+                real(&Path::new(results).join(name), *outward, *is_moved)
             }
         }
     }
@@ -161,7 +149,7 @@ fn dam(folder: &Path, sensors: [&str; 2], is_moved: bool) -> Result<Wall, String
     })
 }
 
-fn real(results: &Path, [x, y]: [f64; 2], moved_m: [f64; 3]) -> Result<Wall, String> {
+fn real(results: &Path, [x, y]: [f64; 2], is_moved: bool) -> Result<Wall, String> {
     let partners: BTreeMap<u32, u32> = table(&results.join("stones.csv"))?
         .iter()
         .filter_map(|row| Some((row["matched_id"].parse().ok()?, row["stone_id"].parse().ok()?)))
@@ -182,7 +170,10 @@ fn real(results: &Path, [x, y]: [f64; 2], moved_m: [f64; 3]) -> Result<Wall, Str
         Ok(all)
     };
     let (first, second) = (labelled(1, 18)?, labelled(2, 4)?);
-    let motion = Rigid3::from(Translation3::from(Vector3::from(moved_m)));
+    let motion = match is_moved {
+        true => Translation3::new(-0.02 * y, 0.02 * x, 0.05).into(),
+        false => Rigid3::identity(),
+    };
     let mut moved = Points::new();
     for (id, own) in second {
         let place = |p: SurveyPoint| SurveyPoint {
@@ -203,12 +194,11 @@ fn real(results: &Path, [x, y]: [f64; 2], moved_m: [f64; 3]) -> Result<Wall, Str
         };
         (*id, truth)
     };
-    let is_still = moved_m == [0.0; 3];
     Ok(Wall {
         truth: first.iter().filter(|(id, _)| **id > 0).map(of_stone).collect(),
         epochs: [first, moved],
-        is_still,
-        is_still_elsewhere: is_still,
+        is_still: !is_moved,
+        is_still_elsewhere: !is_moved,
         ..Wall::default()
     })
 }

@@ -249,3 +249,35 @@ pub fn all() -> Vec<Survey> {
 fn number_of(name: &str) -> u64 {
     name.bytes().fold(7, |n, b| (31 * n + u64::from(b)) % 1_000_003)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn names_are_unique_and_each_kind_happens_five_times() {
+        let all = all();
+        let names: BTreeSet<&str> = all.iter().map(|s| s.name.as_str()).collect();
+        assert_eq!(names.len(), all.len());
+        let of = |kind: &str| all.iter().filter(|s| s.name.contains(kind)).count();
+        assert!(KINDS.iter().all(|kind| of(kind.0) >= 5));
+        assert_eq!(Survey::group("tls-still-12"), "tls-still");
+        assert_eq!(Survey::group("dam_tls-combo"), "dam_tls-combo");
+    }
+
+    /// A small scanned wall on which one stone is loose: it is found, and a second time with the same figures.
+    #[test]
+    fn the_same_survey_has_the_same_figures() {
+        let mut plan = Plan::usual([SCANNER; 2], happened("loose"));
+        plan.size_m = [1.6, 1.2];
+        let once = || figures(&measure(&plan.make(3), &AdjustmentParams::default()).unwrap());
+        let first = once();
+        assert_eq!(first, once());
+        assert!(
+            first["measured"] > 0.9 && first["loose_recall"] > 0.5,
+            "{first:?}"
+        );
+        assert!(first["in_rmse"] < 2.0 && first["out_rmse"] < 1.0, "{first:?}");
+    }
+}
