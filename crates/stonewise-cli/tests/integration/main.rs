@@ -16,7 +16,6 @@ mod frames;
 mod inputs;
 mod installed;
 mod kill;
-mod layers;
 mod life;
 mod output_folder;
 mod scans;

@@ -7,7 +7,6 @@
 )]
 
 mod adjustment;
-mod layers;
 mod lens;
 mod m3c2_py4dgeo;
 mod m3c2_survey;

@@ -15,7 +15,6 @@ mod e57_photos;
 mod hostile_files;
 mod image_io;
 mod label_survey;
-mod layers;
 mod laz_points;
 mod map_cameras;
 mod mask_files;

@@ -4,7 +4,6 @@
 mod average_precision;
 mod built_in;
 mod efficientnet_lite;
-mod layers;
 mod learning;
 mod narrow_model;
 mod relief;

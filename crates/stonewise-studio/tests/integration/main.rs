@@ -2,8 +2,6 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on must stop")]
 
 mod attacks;
-mod bundle;
 mod edits;
-mod layers;
 mod support;
 mod types;

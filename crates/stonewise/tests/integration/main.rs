@@ -8,7 +8,6 @@
 mod adapt;
 mod carry;
 mod experiments;
-mod layers;
 #[path = "../../../stonewise-segment/tests/integration/narrow_model/mod.rs"]
 mod narrow_model;
 mod relief;

@@ -1,6 +1,7 @@
 //! The grid as a table, a plot and a page.
 
-use super::{Dimension, Tuned, TunedPoint};
+use super::grid::Dimension;
+use super::outcome::{Tuned, TunedPoint};
 use crate::error::Result;
 use crate::experiment::tables::{Columns, TextTable};
 use crate::figure::{Axis, GREY, Item, PALETTE, Page, Plot};

@@ -1,4 +1,4 @@
-//! Whether an embedded bundle is what its sources in `web/` make.
+//! The embedded bundles of the report and the studio are what their sources in `web/` make.
 //!
 //! The first line of a bundle holds two digests, of all sources and of the bundle itself; `web/build.mjs` writes them.
 //! Both are computed again here, so that no node is needed to see a source that was changed without a build, or a
@@ -29,13 +29,14 @@ fn files(folder: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Asserts that a bundle and its sources agree. `manifest_dir`: of a crate in `crates/`; `folders`: of the sources, in
-/// `web/`.
-///
-/// # Panics
-/// They do not.
-pub fn assert_bundle(manifest_dir: &str, name: &str, folders: &[&str], script: &str, style: &str) {
-    let web = Path::new(manifest_dir).join("../../web");
+const REPORT: &str = include_str!("../../../stonewise-report/assets/report.js");
+const REPORT_STYLE: &str = include_str!("../../../stonewise-report/assets/report.css");
+const STUDIO: &str = include_str!("../../../stonewise-studio/assets/studio.js");
+const STUDIO_STYLE: &str = include_str!("../../../stonewise-studio/assets/studio.css");
+
+/// Asserts that a bundle is what the sources in these folders of `web/` make.
+fn assert_bundle(name: &str, folders: &[&str], script: &str, style: &str) {
+    let web = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../web");
     if !web.exists() {
         println!("skipped: the sources of the bundle are not here");
         return;
@@ -61,14 +62,24 @@ pub fn assert_bundle(manifest_dir: &str, name: &str, folders: &[&str], script: &
     );
 }
 
-#[cfg(test)]
-mod tests {
-    use super::digest;
+#[test]
+fn bundles_and_sources_agree() {
+    assert_bundle("report", &["src"], REPORT, REPORT_STYLE);
+    assert_bundle("studio", &["src", "studio"], STUDIO, STUDIO_STYLE);
+}
 
-    #[test]
-    fn fnv_is_the_published_function() {
-        // Test vectors of the authors: "" and "foobar".
-        assert_eq!(digest(&[]), "cbf29ce484222325");
-        assert_eq!(digest(&[b"foobar".to_vec()]), "85944171f73967e8");
-    }
+#[test]
+fn the_bundle_of_the_report_carries_the_licence_of_what_it_contains() {
+    assert!(REPORT.contains("The MIT License") && REPORT.contains("three.js authors"));
+    assert!(
+        !REPORT.contains("</script"),
+        "would end the element that holds it"
+    );
+}
+
+#[test]
+fn fnv_is_the_published_function() {
+    // Test vectors of the authors: "" and "foobar".
+    assert_eq!(digest(&[]), "cbf29ce484222325");
+    assert_eq!(digest(&[b"foobar".to_vec()]), "85944171f73967e8");
 }

@@ -1,4 +1,4 @@
-//! Which source files of a crate use which, for the tests of layers of all crates.
+//! Which source files of a crate use which.
 //!
 //! A use is a path through `crate`, `super`, `self` or a child module, outside comments and outside the tests at the
 //! end of a file. It points at the file that owns the item: re-exports are followed. A module inside a file counts
@@ -20,10 +20,10 @@ struct Import {
 /// Fails unless every top-level module of a crate is listed and uses only modules of lines above its own, and no files
 /// use each other in a circle.
 ///
-/// `manifest_dir`: the crate's folder. `layers`: the modules from the bottom up; those on one line do not use each
+/// `folder`: the crate's. `layers`: the modules from the bottom up; those on one line do not use each
 /// other.
-pub fn assert_layers(manifest_dir: &str, layers: &[&[&str]]) {
-    let graph = ModuleGraph::read(&Path::new(manifest_dir).join("src"));
+pub fn assert_layers(folder: &Path, layers: &[&[&str]]) {
+    let graph = ModuleGraph::read(&folder.join("src"));
     let uses: usize = graph.uses.values().map(Vec::len).sum();
     assert!(
         uses >= graph.uses.len(),
