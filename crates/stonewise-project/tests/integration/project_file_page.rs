@@ -1,5 +1,4 @@
 //! The page of the project file, the JSON schema and the program say the same about every key.
-#![allow(clippy::unwrap_used, clippy::panic)] // a test
 
 use serde_json::{Map, Value, json};
 use std::fs;

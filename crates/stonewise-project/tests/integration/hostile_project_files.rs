@@ -1,5 +1,4 @@
 //! Project files with values that cannot be: each is refused with its line and what is allowed.
-#![allow(clippy::unwrap_used)] // a test
 
 use std::fs;
 use stonewise_project::Project;
