@@ -197,7 +197,6 @@ fn simplest(ring: Vec<Point2<f64>>, tolerance: f64) -> Vec<Point2<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
     use rand::{RngExt, SeedableRng};
 
     /// Uniformly random points of a shape within (-1, 1)^2, about `n` of them in the square.
@@ -319,16 +318,14 @@ mod tests {
         assert!(ring.iter().all(|p| (p - origin).dot(&frame.out).abs() < 1e-6));
     }
 
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(64))]
-        #[test]
-        fn any_points_give_a_simple_counter_clockwise_polygon_or_none(
-            seed in 0u64..1_000_000, n in 4usize..400, squeeze in 0.01f64..1.0,
-        ) {
-            let points: Vec<_> = scatter(n, seed, |_| true).iter().map(|p| Point2::new(p.x, p.y * squeeze)).collect();
+    #[test]
+    fn any_points_give_a_simple_counter_clockwise_polygon_or_none() {
+        for case in 0..64_u32 {
+            let squeeze = 0.01 + 0.99 * (0.618034 * f64::from(case)).fract();
+            let points = scatter(4 + 6 * case as usize, u64::from(case), |_| true);
+            let points: Vec<_> = points.iter().map(|p| Point2::new(p.x, p.y * squeeze)).collect();
             if let Some(ring) = outline(&points, &OutlineParams::default()) {
-                prop_assert!(is_simple(&ring));
-                prop_assert!(signed_area(&ring) > 0.0);
+                assert!(is_simple(&ring) && signed_area(&ring) > 0.0, "case {case}");
             }
         }
     }
