@@ -1,19 +1,7 @@
 //! What results, report, project and pipeline share: errors, warnings, messages, parameters, small files.
 //!
 //! Programs that use stonewise take these from the crate `stonewise`, which names them again. Parameters are
-//! checked as those of a project file are:
-//!
-//! ```
-//! use stonewise_base::settings::Settings;
-//! use stonewise_core::params::Params;
-//!
-//! let mut settings = Settings::default();
-//! assert!(settings.check().is_ok());
-//!
-//! settings.m3c2.cylinder_radius_m = -0.1;
-//! let error = settings.check().unwrap_err().to_string();
-//! assert!(error.contains("m3c2.cylinder_radius_m"));
-//! ```
+//! checked as those of a project file are.
 
 pub mod address_space;
 pub mod error;

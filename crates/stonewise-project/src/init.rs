@@ -60,18 +60,6 @@ const HEAD: &str = "#:schema ./stonewise.schema.json
 /// Of what is missing the file says so in a comment, and of what could be taken instead. Folders that
 /// stonewise made, and those of truth, are left out. An existing file is not overwritten.
 ///
-/// ```
-/// # let survey = tempfile::tempdir()?;
-/// # for epoch in ["2024", "2025"] {
-/// #     std::fs::create_dir(survey.path().join(epoch))?;
-/// #     std::fs::write(survey.path().join(epoch).join("wall.xyz"), "1 2 3\n")?;
-/// # }
-/// let made = stonewise_project::init(survey.path())?;
-/// let text = std::fs::read_to_string(&made.path)?;
-/// assert_eq!(text.matches("[[epochs]]").count(), 2);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
 /// # Errors
 /// There is a project file; no folder holds a cloud; a folder cannot be read.
 pub fn init(dir: &Path) -> Result<Initialised> {

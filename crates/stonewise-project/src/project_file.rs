@@ -223,33 +223,6 @@ struct RawEpoch {
 impl Project {
     /// Reads and checks a project file.
     ///
-    /// ```
-    /// use stonewise_project::Project;
-    /// # let folder = tempfile::tempdir()?;
-    /// # let path = folder.path().join("stonewise.toml");
-    /// # for file in ["a.laz", "b.laz", "cameras.xml"] {
-    /// #     std::fs::write(folder.path().join(file), "")?;
-    /// # }
-    /// std::fs::write(&path, r#"
-    ///     [project]
-    ///     name = "Lower dam"
-    ///     [[epochs]]
-    ///     name = "2024"
-    ///     clouds = ["a.laz"]
-    ///     images = "."
-    ///     cameras = "cameras.xml"
-    ///     [[epochs]]
-    ///     name = "2025"
-    ///     clouds = ["b.laz"]
-    ///     images = "."
-    ///     cameras = "cameras.xml"
-    /// "#)?;
-    /// let project = Project::read(&path)?;
-    /// assert_eq!(project.epochs.reference().name, "2024");
-    /// assert_eq!(project.settings.ingest.size_m, 4.0);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
     /// # Errors
     /// With the line: a key that is not known, a file that does not exist, a value that cannot be.
     pub fn read(path: &Path) -> Result<Self> {

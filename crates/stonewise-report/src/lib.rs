@@ -1,11 +1,4 @@
 //! The report, made from result files alone.
-//!
-//! ```no_run
-//! // The folder of a finished run; the report is one HTML file in it.
-//! let page = stonewise_report::write_report("results".as_ref())?;
-//! println!("{}", page.display());
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
 mod browser;
 mod draw;

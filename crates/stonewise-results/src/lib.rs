@@ -1,14 +1,5 @@
 //! The result files of a run as types: stones and their columns, outlines, the unrolled wall, joints,
 //! evidence, records.
-//!
-//! ```no_run
-//! use stonewise_results::ResultSet;
-//!
-//! for stone in &ResultSet::read("results".as_ref())?.stones {
-//!     println!("{} {:?}", stone.stone_id, stone.motion.as_ref().map(|m| m.displacement));
-//! }
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
 pub mod calendar;
 mod change_points;

@@ -2,13 +2,6 @@
 //!
 //! The library does the work; the page is TypeScript in `web/studio`. docs/src/studio.md says what the page does and
 //! what is promised about its security.
-//!
-//! ```no_run
-//! let studio = stonewise_studio::Studio::open("survey".as_ref(), 0, false)?;
-//! println!("{}", studio.address());
-//! studio.wait(|| false);
-//! # Ok::<(), std::io::Error>(())
-//! ```
 
 mod api;
 mod assets;
