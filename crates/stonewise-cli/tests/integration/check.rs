@@ -1,6 +1,6 @@
 //! `check`, and what a run makes of surveys that cannot be right.
 
-use crate::support::{copy_of, outcome, run, sharp_survey, stonewise, survey, tiny_survey};
+use crate::support::{SHARP, copy_of, outcome, run, simulated, stonewise, survey, tiny_survey};
 use nalgebra::Point3;
 use std::collections::BTreeSet;
 use std::fs;
@@ -190,7 +190,7 @@ const CASES: [Case; 17] = [
         |dir| {
             let photo = first_photo(dir);
             fs::remove_file(&photo).unwrap();
-            write_jpeg(&photo, &Raster::filled(1200, 900, [118; 3]), 90).unwrap();
+            write_jpeg(&photo, &Raster::filled(600, 450, [118; 3]), 90).unwrap();
         },
         "of one colour: IMG_2001",
         false,
@@ -230,16 +230,17 @@ const CASES: [Case; 17] = [
             fs::remove_file(&photo).unwrap();
             write_jpeg(&photo, &half.unwrap(), 90).unwrap();
         },
-        "camera 1200x900 px",
+        "camera 600x450 px",
         false,
     ),
 ];
 
 #[test]
 fn a_sound_survey_passes() {
-    let survey = copy_of(sharp_survey());
-    let (code, table, log) = check(survey.path());
+    let (_dir, survey) = simulated(SHARP);
+    let (code, table, log) = check(&survey);
     assert_eq!(code, 0, "{table}{log}");
+    assert_eq!(table.matches("edges fit best 0 px").count(), 2, "{table}");
     for line in [
         "point spacing",
         "overlap",
@@ -251,16 +252,16 @@ fn a_sound_survey_passes() {
     ] {
         assert!(table.contains(line), "{line}: {table}");
     }
-    let page = fs::read_to_string(survey.path().join("stonewise.check.html")).unwrap();
+    let page = fs::read_to_string(survey.join("stonewise.check.html")).unwrap();
     assert_eq!(
         page.matches("data:image/jpeg").count(),
         2,
         "a picture for each epoch"
     );
     // The page is replaced, but nothing else of that name.
-    assert_eq!(check(survey.path()).0, 0);
-    fs::write(survey.path().join("stonewise.check.html"), "mine").unwrap();
-    let (code, _, log) = check(survey.path());
+    assert_eq!(check(&survey).0, 0);
+    fs::write(survey.join("stonewise.check.html"), "mine").unwrap();
+    let (code, _, log) = check(&survey);
     assert!(code == 1 && log.contains("no page of this command"), "{log}");
 }
 
@@ -294,7 +295,7 @@ fn a_page_that_is_not_asked_for_leaves_the_survey_as_it_is() {
 
 #[test]
 fn photos_of_cameras_that_epochs_share_are_not_missing() {
-    let survey = copy_of(sharp_survey());
+    let survey = copy_of(tiny_survey());
     let halves = survey.path().join("halves");
     let mut split = stonewise();
     split.arg("split").arg(survey.path().join("stonewise.toml"));
@@ -310,7 +311,7 @@ fn photos_of_cameras_that_epochs_share_are_not_missing() {
 
 #[test]
 fn photos_that_are_not_there_are_not_said_to_see_nothing() {
-    let survey = copy_of(sharp_survey());
+    let survey = copy_of(tiny_survey());
     for (number, photo) in photos(survey.path()).into_iter().enumerate() {
         fs::rename(
             &photo,
@@ -327,7 +328,7 @@ fn photos_that_are_not_there_are_not_said_to_see_nothing() {
 #[test]
 fn broken_surveys_are_named_and_a_run_stops_where_they_cannot_be_right() {
     for (what, spoil, word, stops) in CASES {
-        let survey = copy_of(sharp_survey());
+        let survey = copy_of(tiny_survey());
         spoil(survey.path());
         let (code, table, log) = check(survey.path());
         println!("--- {what}\n{table}");
@@ -347,7 +348,7 @@ fn broken_surveys_are_named_and_a_run_stops_where_they_cannot_be_right() {
 
 #[test]
 fn everything_is_looked_at_where_inputs_cannot_be_read() {
-    let survey = copy_of(sharp_survey());
+    let survey = copy_of(tiny_survey());
     let (cloud, dir) = (fs::read(survey.path().join(CLOUD_2)).unwrap(), survey.path());
     fs::write(dir.join("epoch1/cloud_tls.laz"), "").unwrap();
     fs::write(dir.join(CLOUD_2), &cloud[..cloud.len() / 2]).unwrap();
@@ -378,7 +379,7 @@ fn everything_is_looked_at_where_inputs_cannot_be_read() {
 
 #[test]
 fn masks_that_a_run_cannot_use_are_found() {
-    let survey = copy_of(sharp_survey());
+    let survey = copy_of(tiny_survey());
     let dir = survey.path();
     let json = dir.join("masks/epoch2.json");
     fs::write(&json, "").unwrap();
@@ -395,7 +396,7 @@ fn masks_that_a_run_cannot_use_are_found() {
     fs::write(project, text.replace("masks/epoch2.json", "masks/epoch2")).unwrap();
     fs::create_dir(&masks).unwrap();
     let of = |photo: &Path| masks.join(photo.file_name().unwrap()).with_extension("png");
-    let labels = LabelImage::filled(1200, 900, 7);
+    let labels = LabelImage::filled(600, 450, 7);
     for photo in photos(dir) {
         write_label_png(&of(&photo), &labels).unwrap();
     }

@@ -2,32 +2,14 @@
 //! into the file.
 
 use crate::support::stones::{SIGNED, inner, nearest, number, place, rows};
-use crate::support::{copy_tree, outcome, run, stonewise, survey};
+use crate::support::{copy_tree, outcome, run, stonewise, survey, survey_results};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 use stonewise_io::cameras::read_cameras;
 use stonewise_io::layers::{Geometry, Layer, read_polygons, write_geopackage};
 use stonewise_io::table::Table;
 use tempfile::TempDir;
-
-/// A survey in `survey` and a finished run of it without edits in `results`, made once for all tests.
-fn base() -> &'static Path {
-    static DIR: OnceLock<TempDir> = OnceLock::new();
-    DIR.get_or_init(|| {
-        let dir = tempfile::tempdir().unwrap();
-        copy_tree(survey(), &dir.path().join("survey"));
-        let (code, text) = run(&dir.path().join("survey"), &dir.path().join("results"), &[]);
-        assert_eq!(code, 0, "{text}");
-        dir
-    })
-    .path()
-}
-
-fn finished() -> PathBuf {
-    base().join("results")
-}
 
 /// A copy of the survey, and where its results go: they belong to the project file of the copy.
 struct Copy {
@@ -40,7 +22,7 @@ impl Copy {
     fn new() -> Self {
         let dir = tempfile::tempdir().unwrap();
         let (survey, out) = (dir.path().join("survey"), dir.path().join("results"));
-        copy_tree(&base().join("survey"), &survey);
+        copy_tree(self::survey(), &survey);
         Self {
             _dir: dir,
             survey,
@@ -71,7 +53,7 @@ fn step(out: &Path, name: &str) -> serde_json::Value {
 
 #[test]
 fn edits_change_what_they_name_and_leave_the_rest_alone() {
-    let before = rows(&finished().join("stones.csv"));
+    let before = rows(&survey_results().join("stones.csv"));
     let candidates = inner(&before);
     let merged = candidates[0];
     let partner = nearest(&before, merged, &[]);
@@ -83,7 +65,7 @@ fn edits_change_what_they_name_and_leave_the_rest_alone() {
         .unwrap();
     let line = |id: u32| {
         // From border to border of its outline, through its middle.
-        let layer = read_polygons(&finished().join("stones.gpkg"), "stones_facade").unwrap();
+        let layer = read_polygons(&survey_results().join("stones.gpkg"), "stones_facade").unwrap();
         let of = |f: &&stonewise_io::layers::PolygonFeature| f.attributes["stone_id"] == id.to_string();
         let ring = layer.iter().find(of).unwrap().polygons[0][0].clone();
         let [x, _] = place(&before[&id]);
@@ -230,7 +212,7 @@ fn edits_change_what_they_name_and_leave_the_rest_alone() {
         "epoch1/cloud_tls.laz",
     ] {
         assert!(
-            fs::read(out.join(file)).unwrap() == fs::read(finished().join(file)).unwrap(),
+            fs::read(out.join(file)).unwrap() == fs::read(survey_results().join(file)).unwrap(),
             "{file}"
         );
     }
@@ -239,7 +221,7 @@ fn edits_change_what_they_name_and_leave_the_rest_alone() {
 
 #[test]
 fn a_stone_is_deleted_in_a_photo_and_drawn_anew_and_an_edit_without_effect_is_named() {
-    let before = rows(&finished().join("stones.csv"));
+    let before = rows(&survey_results().join("stones.csv"));
     let gone = inner(&before)[2];
     let cameras = read_cameras(&survey().join("epoch2/cameras_metashape.xml")).unwrap();
     let centroid = nalgebra::Point3::new(
@@ -303,8 +285,8 @@ fn a_stone_is_deleted_in_a_photo_and_drawn_anew_and_an_edit_without_effect_is_na
 
 #[test]
 fn the_detector_outlines_the_stone_in_a_box() {
-    let before = rows(&finished().join("stones.csv"));
-    let features = read_polygons(&finished().join("stones.gpkg"), "stones_facade").unwrap();
+    let before = rows(&survey_results().join("stones.csv"));
+    let features = read_polygons(&survey_results().join("stones.gpkg"), "stones_facade").unwrap();
     // A bench and a railing hide parts of the lowest course.
     let is_whole = |id: &u32| place(&before[id])[1] > 0.3;
     let gone: Vec<u32> = inner(&before).into_iter().filter(is_whole).step_by(4).collect();
@@ -350,8 +332,8 @@ fn the_detector_outlines_the_stone_in_a_box() {
 
 #[test]
 fn the_layer_of_the_geopackage_comes_back_as_edits() {
-    let before = rows(&finished().join("stones.csv"));
-    let features = read_polygons(&finished().join("stones.gpkg"), "stones_facade").unwrap();
+    let before = rows(&survey_results().join("stones.csv"));
+    let features = read_polygons(&survey_results().join("stones.gpkg"), "stones_facade").unwrap();
     let candidates = inner(&before);
     let (merged, gone) = (candidates[0], *candidates.last().unwrap());
     let partner = nearest(&before, merged, &[gone]);
@@ -430,7 +412,7 @@ fn the_layer_of_the_geopackage_comes_back_as_edits() {
             .arg(&file);
         command
             .args(["--who", "A. Keller", "--why", "drawn in QGIS", "--results"])
-            .arg(finished());
+            .arg(survey_results());
         outcome(command.args(more))
     };
     let (code, text) = import(&edited, &[]);
@@ -446,7 +428,7 @@ fn the_layer_of_the_geopackage_comes_back_as_edits() {
     assert_eq!(json["edits"][2]["outline"].as_array().unwrap().len(), 4);
     assert!(json["facade"]["stretches"].is_array());
     assert_eq!(import(&edited, &[]).0, 1, "a file that is there is not replaced");
-    let (code, text) = import(&finished().join("stones.gpkg"), &["--append"]);
+    let (code, text) = import(&survey_results().join("stones.gpkg"), &["--append"]);
     assert!(code == 0 && text.contains("nothing was edited"), "{text}");
     let listed = stonewise().args(["edits", "check"]).arg(&file).output().unwrap();
     assert_eq!(String::from_utf8_lossy(&listed.stdout).lines().count(), 6);

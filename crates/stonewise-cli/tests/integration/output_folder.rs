@@ -1,7 +1,7 @@
 //! What a run may do to files that are there: inputs, other people's, those of earlier and of broken-off
 //! runs.
 
-use crate::support::{contents, copy_of, outcome, run, stonewise, survey, tiny_survey};
+use crate::support::{contents, copy_of, outcome, run, stonewise, tiny_results, tiny_survey};
 use std::fs::{self, File};
 use std::path::Path;
 
@@ -19,7 +19,7 @@ fn results(out: &Path) -> Vec<(std::path::PathBuf, Vec<u8>)> {
 
 #[test]
 fn inputs_are_never_written_over() {
-    let survey = copy_of(survey());
+    let survey = copy_of(tiny_survey());
     let before = contents(survey.path(), &[]);
     for extra in [&[][..], &["--force"]] {
         let (code, log) = run(survey.path(), survey.path(), extra);
@@ -73,12 +73,12 @@ fn other_peoples_folders_are_refused_and_their_files_stay() {
     fs::write(out.path().join("stones.csv"), "mine").unwrap();
     fs::write(out.path().join("notes.txt"), "mine").unwrap();
     let before = contents(out.path(), &[]);
-    let (code, log) = run(survey(), out.path(), &[]);
+    let (code, log) = run(tiny_survey(), out.path(), &[]);
     assert_eq!(code, 2, "{log}");
     assert!(log.contains("not empty") && log.contains("--force"), "{log}");
     assert!(contents(out.path(), &[]) == before);
 
-    let (code, log) = run(survey(), out.path(), &["--force"]);
+    let (code, log) = run(tiny_survey(), out.path(), &["--force"]);
     assert_eq!(code, 0, "{log}");
     assert_eq!(fs::read(out.path().join("notes.txt")).unwrap(), b"mine");
     assert!(
@@ -88,18 +88,18 @@ fn other_peoples_folders_are_refused_and_their_files_stay() {
     );
 
     // From now on the folder is this project's, and no other's.
-    let other = copy_of(survey());
+    let other = copy_of(tiny_survey());
     let (code, log) = run(other.path(), out.path(), &[]);
     assert!(
-        code == 2 && log.contains("something else (project \"Test wall\""),
+        code == 2 && log.contains("something else (project \"Tiny wall\""),
         "{log}"
     );
-    assert_eq!(run(survey(), out.path(), &[]).0, 0);
+    assert_eq!(run(tiny_survey(), out.path(), &[]).0, 0);
     assert_eq!(fs::read(out.path().join("notes.txt")).unwrap(), b"mine");
 
     // Without the marker in work/, run.json tells whose the folder is.
     fs::remove_dir_all(out.path().join("work")).unwrap();
-    assert_eq!(run(survey(), out.path(), &[]).0, 0);
+    assert_eq!(run(tiny_survey(), out.path(), &[]).0, 0);
 }
 
 #[test]
@@ -167,9 +167,7 @@ fn wrong_parameters_of_a_simulation_are_named_in_a_line_and_leave_nothing() {
 #[cfg(target_os = "linux")]
 #[test]
 fn writing_that_fails_leaves_no_half_of_a_file() {
-    let reference = tempfile::tempdir().unwrap();
-    assert_eq!(run(tiny_survey(), reference.path(), &[]).0, 0);
-    let whole = results(reference.path());
+    let whole = results(tiny_results());
     let out = tempfile::tempdir().unwrap();
     for (blocks, file) in [(64, "ingest-1"), (400, "m3c2.csv"), (1600, "report/index.html")] {
         let mut shell = assert_cmd::Command::new("sh");
@@ -205,17 +203,16 @@ fn writing_that_fails_leaves_no_half_of_a_file() {
 
 #[test]
 fn two_runs_do_not_share_a_folder() {
-    let out = tempfile::tempdir().unwrap();
-    fs::create_dir(out.path().join("work")).unwrap();
+    let out = copy_of(tiny_results());
     let lock = File::create(out.path().join("work/lock")).unwrap();
     lock.lock().unwrap();
-    let (code, log) = run(survey(), out.path(), &[]);
+    let (code, log) = run(tiny_survey(), out.path(), &[]);
     assert!(
         code == 1 && log.contains("another run works in this folder"),
         "{log}"
     );
     drop(lock);
-    assert_eq!(run(survey(), out.path(), &[]).0, 0);
+    assert_eq!(run(tiny_survey(), out.path(), &[]).0, 0);
 }
 
 /// Flips one bit in the middle of a file.
@@ -228,8 +225,7 @@ fn flip(path: &Path) {
 
 #[test]
 fn damaged_work_is_done_again_and_said() {
-    let out = tempfile::tempdir().unwrap();
-    assert_eq!(run(survey(), out.path(), &[]).0, 0);
+    let out = copy_of(tiny_results());
     let sound = results(out.path());
     let work = out.path().join("work");
     // The one version of a step.
@@ -260,7 +256,7 @@ fn damaged_work_is_done_again_and_said() {
     let partial = folder("label-1").join(".7_0_0.parquet.123.partial");
     fs::write(&partial, "half").unwrap();
 
-    let (code, log) = run(survey(), out.path(), &[]);
+    let (code, log) = run(tiny_survey(), out.path(), &[]);
     assert_eq!(code, 0, "{log}");
     for step in [
         "ingest-1",
@@ -284,13 +280,13 @@ fn damaged_work_is_done_again_and_said() {
     assert!(!log.contains("step match-2 was done again"), "{log}");
     assert!(results(out.path()) == sound, "results differ");
     assert!(!partial.exists());
-    let (_, log) = run(survey(), out.path(), &[]);
+    let (_, log) = run(tiny_survey(), out.path(), &[]);
     assert!(!log.contains("done again"), "{log}");
 }
 
 #[test]
 fn results_of_an_earlier_run_do_not_pass_for_those_of_a_failed_one() {
-    let survey = copy_of(survey());
+    let survey = copy_of(tiny_survey());
     let out = tempfile::tempdir().unwrap();
     assert_eq!(run(survey.path(), out.path(), &[]).0, 0);
     let sound = results(out.path());
@@ -315,6 +311,10 @@ fn results_of_an_earlier_run_do_not_pass_for_those_of_a_failed_one() {
         assert!(out.path().join("previous").join(gone).exists(), "{gone} is lost");
     }
     assert!(fs::read(out.path().join("previous/stones.csv")).unwrap() == stones);
+    // Every file that a run leaves is known as a result.
+    let left = contents(out.path(), &["work", "previous", "UNFINISHED.txt"]);
+    let names: Vec<_> = left.iter().map(|(name, _)| name).collect();
+    assert!(names.is_empty(), "not known as results: {names:?}");
     assert!(
         fs::read_to_string(out.path().join("UNFINISHED.txt"))
             .unwrap()
@@ -328,20 +328,8 @@ fn results_of_an_earlier_run_do_not_pass_for_those_of_a_failed_one() {
 }
 
 #[test]
-fn every_file_that_a_run_leaves_is_one_that_the_next_run_moves_aside() {
-    let survey = copy_of(survey());
-    let out = tempfile::tempdir().unwrap();
-    assert_eq!(run(survey.path(), out.path(), &[]).0, 0);
-    fs::write(survey.path().join("masks/epoch2.json"), "{").unwrap();
-    assert_eq!(run(survey.path(), out.path(), &[]).0, 1);
-    let left = contents(out.path(), &["work", "previous", "UNFINISHED.txt"]);
-    let names: Vec<_> = left.iter().map(|(name, _)| name).collect();
-    assert!(names.is_empty(), "not known as results: {names:?}");
-}
-
-#[test]
 fn impossible_tiles_and_twin_epochs_are_wrong_usage() {
-    let survey = copy_of(survey());
+    let survey = copy_of(tiny_survey());
     let project = survey.path().join("stonewise.toml");
     let text = fs::read_to_string(&project).unwrap();
     let out = survey.path().join("out");

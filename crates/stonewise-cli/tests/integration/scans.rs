@@ -1,7 +1,7 @@
 //! Surveys without photos: two scans and one command.
 
 use crate::support::stones::{number, rows};
-use crate::support::{copy_of, outcome, stonewise, survey};
+use crate::support::{copy_of, outcome, stonewise, survey, tiny_survey};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -63,7 +63,7 @@ fn two_scans_alone_are_run_and_scored_against_the_truth() {
 
 #[test]
 fn views_beside_photos_show_stones_and_track_none() {
-    let survey = copy_of(survey());
+    let survey = copy_of(tiny_survey());
     let epoch = |number: u8| {
         format!(
             "[[epochs]]\nname = \"{number}\"\nclouds = [\"epoch{number}/cloud_tls.laz\"]\n\

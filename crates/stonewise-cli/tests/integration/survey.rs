@@ -1,6 +1,6 @@
 //! The command on a small simulated survey: results, resuming, threads, and every way an input can be bad.
 
-use crate::support::{copy_of, run, stonewise, survey};
+use crate::support::{copy_of, run, stonewise, survey, survey_results, tiny_survey};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,9 +16,7 @@ fn column(out: &Path, name: &str) -> Vec<String> {
 
 #[test]
 fn a_run_writes_every_result_and_resumes_to_the_same_bytes_with_any_number_of_threads() {
-    let out = tempfile::tempdir().unwrap();
-    let (code, text) = run(survey(), out.path(), &["--threads", "2"]);
-    assert_eq!(code, 0, "{text}");
+    let out = copy_of(survey_results());
     let files = [
         "stones.csv",
         "stones.parquet",
@@ -291,7 +289,7 @@ fn bad_inputs_are_named_and_nothing_half_written_stays() {
         ),
     ];
     for (what, spoil, expected, named) in cases {
-        let survey = copy_of(survey());
+        let survey = copy_of(tiny_survey());
         spoil(survey.path());
         let out = tempfile::tempdir().unwrap();
         let (code, log) = run(survey.path(), out.path(), &[]);
@@ -325,7 +323,7 @@ fn partial_files(dir: &Path) -> Vec<PathBuf> {
 
 #[test]
 fn init_writes_a_project_that_runs_need_no_change_in() {
-    let survey = copy_of(survey());
+    let survey = copy_of(tiny_survey());
     for folder in ["truth", "masks"] {
         fs::remove_dir_all(survey.path().join(folder)).unwrap();
     }

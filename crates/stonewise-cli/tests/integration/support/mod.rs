@@ -49,22 +49,22 @@ focal_px = 825.0
 distance_m = 5.0
 "#;
 
-/// A wall whose photos and points are fine enough to compare its edges in both.
-const SHARP: &str = r#"
+/// A wall whose photos and points are fine enough to find its edges in both.
+pub const SHARP: &str = r#"
 name = "Sharp wall"
 [scene]
 seed = 5
 [scene.wall]
-width_m = 2.4
-height_m = 1.6
+width_m = 1.6
+height_m = 1.0
 seed = 5
 [scene.tls]
 spacing_m = 0.004
 [photos]
 columns = 2
 rows = 1
-width = 1200
-height = 900
+width = 800
+height = 600
 focal_px = 1700.0
 distance_m = 5.0
 "#;
@@ -114,10 +114,23 @@ pub fn tiny_survey() -> &'static Path {
     &DIR.get_or_init(|| simulated(TINY)).1
 }
 
-/// The finer survey, made once for all tests of a program.
-pub fn sharp_survey() -> &'static Path {
-    static DIR: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
-    &DIR.get_or_init(|| simulated(SHARP)).1
+/// Results of the smallest survey, made once for all tests of a program; a copy of them goes on as they would.
+pub fn tiny_results() -> &'static Path {
+    static DIR: OnceLock<TempDir> = OnceLock::new();
+    DIR.get_or_init(|| finished(tiny_survey())).path()
+}
+
+/// Results of the survey, made by two threads, once for all tests of a program.
+pub fn survey_results() -> &'static Path {
+    static DIR: OnceLock<TempDir> = OnceLock::new();
+    DIR.get_or_init(|| finished(survey())).path()
+}
+
+fn finished(survey: &Path) -> TempDir {
+    let out = tempfile::tempdir().unwrap();
+    let (code, log) = run(survey, out.path(), &["--threads", "2"]);
+    assert_eq!(code, 0, "{log}");
+    out
 }
 
 /// A survey made with these parameters, and the folder that holds it.
@@ -136,7 +149,7 @@ pub fn simulated(params: &str) -> (TempDir, PathBuf) {
     (dir, survey)
 }
 
-/// A copy of a survey that a test may spoil.
+/// A copy of a survey or of results that a test may spoil.
 pub fn copy_of(survey: &Path) -> TempDir {
     let dir = tempfile::tempdir().unwrap();
     copy_tree(survey, dir.path());
