@@ -1,54 +1,33 @@
 //! Every reader, with the files that it is tried on.
 
-use super::mutate::mutate;
-use super::random::Random;
-use super::repair;
-use super::seeds::{PROJECT, PROJECT_FILES, Seed, testdata, testdata_path, text, written};
-use nalgebra::Point3;
+use super::campaign::{Campaign, SameInputs};
+use super::edit::Input;
+use super::readers;
+use super::seeds::{PROJECT, PROJECT_FILES, Seed, testdata, text, written};
 use std::fs;
 use std::path::Path;
-use stonewise::Project;
 use stonewise_core::raster::Raster;
-use stonewise_io::cameras::{MapFrame, find_photos, read_cameras_on_map};
-use stonewise_io::cloud::{
-    CloudError, CloudFormat, LabelColumns, PointChunk, PointLabel, cloud_info, measure_cloud, read_mesh,
-    write_labelled,
-};
-use stonewise_io::crs::{Crs, Geodetic, Geoid, MapSystem};
-use stonewise_io::image_io::{image_size, read_rgb, write_jpeg, write_png_rgb};
-use stonewise_io::masks::{CocoMasks, LabelFolder, ValidRegions, write_label_png};
-
-type Read = fn(&Path) -> Result<(), String>;
+use stonewise_io::crs::Crs;
+use stonewise_io::image_io::{write_jpeg, write_png_rgb};
+use stonewise_io::masks::write_label_png;
 
 /// A reader.
 pub struct Target {
-    pub name: &'static str,
-    /// Reads a file through every door of this kind.
-    pub read: Read,
+    pub read: fn(&Path) -> Result<(), String>,
     seeds: Vec<Seed>,
-    is_text: bool,
-    /// Makes checksums right.
+    /// Makes checksums right, so that what lies behind them is reached.
     repair: Option<fn(&mut [u8])>,
     /// Sound files that lie beside the input.
     beside: Vec<Seed>,
 }
 
 impl Target {
-    fn of_bytes(name: &'static str, seeds: Vec<Seed>, read: Read) -> Self {
+    fn new(read: fn(&Path) -> Result<(), String>, seeds: Vec<Seed>) -> Self {
         Self {
-            name,
             read,
             seeds,
-            is_text: false,
             repair: None,
             beside: Vec::new(),
-        }
-    }
-
-    fn of_text(name: &'static str, seeds: Vec<Seed>, read: Read) -> Self {
-        Self {
-            is_text: true,
-            ..Self::of_bytes(name, seeds, read)
         }
     }
 
@@ -71,107 +50,92 @@ impl Target {
         fs::create_dir_all(home.join("images")).unwrap();
     }
 
-    /// A changed seed; one in twenty is left as it is.
-    pub fn input(&self, random: &mut Random) -> (String, Vec<u8>) {
-        let seed = random.of(&self.seeds);
+    /// The name and the bytes of a changed seed.
+    pub fn bytes_of(&self, input: &Input) -> (String, Vec<u8>) {
+        let [seed, other] = [input.seed, input.other].map(|n| &self.seeds[usize::from(n) % self.seeds.len()]);
         let mut bytes = seed.bytes.clone();
-        if !random.one_in(20) {
-            mutate(&mut bytes, &random.of(&self.seeds).bytes, self.is_text, random);
-            if let Some(repair) = self.repair.filter(|_| !random.one_in(4)) {
-                repair(&mut bytes);
-            }
+        for edit in &input.edits {
+            edit.apply(&mut bytes, &other.bytes);
+        }
+        if let Some(repair) = self.repair.filter(|_| !input.is_damage) {
+            repair(&mut bytes);
         }
         (seed.name.clone(), bytes)
     }
 }
 
-/// All readers.
-pub fn targets() -> Vec<Target> {
-    vec![
-        Target::of_bytes(
-            "las",
-            testdata(&[
-                "clouds/las10_format1.las",
-                "clouds/las11_format0.las",
-                "clouds/las12_format3.las",
-                "clouds/las13_format1.laz",
-                "clouds/las14_format8.las",
-                "hostile/las_2e60.las",
-            ]),
-            las,
-        ),
-        Target::of_bytes(
-            "laz",
-            testdata(&[
-                "clouds/las12_format2.laz",
-                "clouds/las14_format6.laz",
-                "clouds/las14_format7_extra.laz",
-                "hostile/layer_sizes.laz",
-                "hostile/laz_2e60.laz",
-            ]),
-            las,
-        ),
-        Target::of_bytes("copc", testdata(&["clouds/chunks.copc.laz"]), las),
-        Target::of_bytes("e57", testdata(&["clouds/two_scans.e57"]), las).repaired(repair::e57),
-        Target::of_bytes("ply", testdata(&["clouds/little.ply", "clouds/big.ply"]), ply),
-        Target::of_text("ply text", ply_texts(), ply),
-        Target::of_text("ptx", testdata(&["clouds/two_scans.ptx"]), las),
-        Target::of_text(
-            "xyz",
-            testdata(&[
-                "clouds/plain.xyz",
-                "clouds/tabs.txt",
-                "clouds/header.csv",
-                "clouds/german.csv",
-                "clouds/count.pts",
-            ]),
-            cloud,
-        ),
-        Target::of_text("metashape", metashape(), map_cameras),
-        Target::of_text(
-            "colmap text",
-            testdata(&["cameras/colmap_txt/images.txt"]),
-            cameras,
-        )
+macro_rules! targets {
+    ($($name:ident: $target:expr,)*) => {
+        $(
+            #[test]
+            fn $name() {
+                let campaign = Campaign::new(stringify!($name), $target);
+                if cfg!(fuzzing) {
+                    bolero::check!().with_type().for_each(|input| campaign.try_input(input));
+                } else {
+                    let target = bolero::TestTarget::new(SameInputs);
+                    target.with_type().for_each(|input| campaign.try_input(input));
+                }
+                campaign.end();
+            }
+        )*
+    };
+}
+
+targets! {
+    las: Target::new(readers::las, testdata(&[
+        "clouds/las10_format1.las",
+        "clouds/las11_format0.las",
+        "clouds/las12_format3.las",
+        "clouds/las13_format1.laz",
+        "clouds/las14_format8.las",
+        "hostile/las_2e60.las",
+    ])),
+    laz: Target::new(readers::las, testdata(&[
+        "clouds/las12_format2.laz",
+        "clouds/las14_format6.laz",
+        "clouds/las14_format7_extra.laz",
+        "hostile/layer_sizes.laz",
+        "hostile/laz_2e60.laz",
+    ])),
+    copc: Target::new(readers::las, testdata(&["clouds/chunks.copc.laz"])),
+    e57: Target::new(readers::las, testdata(&["clouds/two_scans.e57"])).repaired(page_checksums),
+    ply: Target::new(readers::ply, testdata(&["clouds/little.ply", "clouds/big.ply"])),
+    ply_text: Target::new(readers::ply, ply_texts()),
+    ptx: Target::new(readers::las, testdata(&["clouds/two_scans.ptx"])),
+    xyz: Target::new(readers::cloud, testdata(&[
+        "clouds/plain.xyz",
+        "clouds/tabs.txt",
+        "clouds/header.csv",
+        "clouds/german.csv",
+        "clouds/count.pts",
+    ])),
+    metashape: Target::new(readers::map_cameras, metashape_files()),
+    colmap_text: Target::new(readers::cameras, testdata(&["cameras/colmap_txt/images.txt"]))
         .beside(testdata(&["cameras/colmap_txt/cameras.txt"])),
-        Target::of_text(
-            "pix4d",
-            testdata(&["cameras/pix4d/dam_calibrated_camera_parameters.txt"]),
-            cameras,
-        ),
-        Target::of_text(
-            "realitycapture",
-            testdata(&[
-                "cameras/realitycapture/cameras.csv",
-                "cameras/realitycapture/opencv.csv",
-                "cameras/realitycapture/xmp/brown3t2.xmp",
-            ]),
-            cameras,
-        )
-        .beside(vec![photo_named("none.jpg"), photo_named("brown3t2.jpg")]),
-        Target::of_bytes(
-            "colmap",
-            testdata(&["cameras/colmap_bin/cameras.bin", "cameras/colmap_bin/images.bin"]),
-            cameras,
-        )
-        .beside(testdata(&[
-            "cameras/colmap_bin/cameras.bin",
-            "cameras/colmap_bin/images.bin",
-        ])),
-        Target::of_text("opensfm", testdata(&["cameras/opensfm.json"]), cameras),
-        Target::of_bytes(
-            "geoid",
-            testdata(&["crs/geoid.gtx", "crs/geoid_area.tif", "crs/geoid_point.tif"]),
-            geoid,
-        ),
-        Target::of_text("coco", vec![text("masks.json", MASKS)], coco),
-        Target::of_text("regions", vec![text("regions.json", REGIONS)], regions),
-        Target::of_bytes("labels", label_images(), labels).repaired(repair::png),
-        Target::of_bytes("photos", photos(), photo).repaired(repair::png),
-        Target::of_text("project", vec![text("stonewise.toml", PROJECT)], project)
-            .beside(PROJECT_FILES.map(|name| text(name, "")).into()),
-        Target::of_bytes("init", folder_plans(), init),
-    ]
+    pix4d: Target::new(readers::cameras, testdata(&[
+        "cameras/pix4d/dam_calibrated_camera_parameters.txt",
+    ])),
+    realitycapture: Target::new(readers::cameras, testdata(&[
+        "cameras/realitycapture/cameras.csv",
+        "cameras/realitycapture/opencv.csv",
+        "cameras/realitycapture/xmp/brown3t2.xmp",
+    ]))
+    .beside(vec![photo_named("none.jpg"), photo_named("brown3t2.jpg")]),
+    colmap: Target::new(readers::cameras, colmap_files()).beside(colmap_files()),
+    opensfm: Target::new(readers::cameras, testdata(&["cameras/opensfm.json"])),
+    geoid: Target::new(readers::geoid, testdata(&[
+        "crs/geoid.gtx",
+        "crs/geoid_area.tif",
+        "crs/geoid_point.tif",
+    ])),
+    coco: Target::new(readers::coco, vec![text("masks.json", MASKS)]),
+    regions: Target::new(readers::regions, vec![text("regions.json", REGIONS)]),
+    labels: Target::new(readers::labels, label_images()),
+    photos: Target::new(readers::photo, photo_files()),
+    project: Target::new(readers::project, vec![text("stonewise.toml", PROJECT)])
+        .beside(PROJECT_FILES.map(|name| text(name, "")).into()),
+    init: Target::new(readers::init, folder_plans()),
 }
 
 /// See `init`: two epochs with clouds and photos, and files without folders.
@@ -191,6 +155,10 @@ const MASKS: &str = r#"{"images": [{"id": 1, "file_name": "images/0001.jpg", "wi
 const REGIONS: &str = r#"{"images/0001.jpg": {"width": 64, "height": 48, "valid": [
  {"outer": [0, 0, 60, 0, 60, 40, 0, 40], "holes": [[2, 2, 9, 2, 9, 9]]}]}}"#;
 
+fn colmap_files() -> Vec<Seed> {
+    testdata(&["cameras/colmap_bin/cameras.bin", "cameras/colmap_bin/images.bin"])
+}
+
 fn ply_texts() -> Vec<Seed> {
     let mut seeds = testdata(&[
         "clouds/text.ply",
@@ -204,7 +172,7 @@ fn ply_texts() -> Vec<Seed> {
     seeds
 }
 
-fn metashape() -> Vec<Seed> {
+fn metashape_files() -> Vec<Seed> {
     let mut seeds = testdata(&["cameras/metashape.xml", "hostile/bomb.xml", "hostile/xxe.xml"]);
     // Earth-centred poses, near Bonn.
     let camera = "<camera id=\"0\" sensor_id=\"0\" label=\"one.jpg\"><transform>1 0 0 3980000 0 1 0 498000 0 0 1 4944000 \
@@ -234,7 +202,7 @@ fn photo_named(name: &str) -> Seed {
     written(name, |path| write_jpeg(path, &picture, 90).unwrap())
 }
 
-fn photos() -> Vec<Seed> {
+fn photo_files() -> Vec<Seed> {
     let pixels = (0..64 * 48).map(|i| [i as u8, (i / 64) as u8, 99]).collect();
     let picture = Raster::from_vec(64, 48, pixels).unwrap();
     let mut seeds = testdata(&["hostile/lie.jpg"]);
@@ -247,149 +215,22 @@ fn photos() -> Vec<Seed> {
     seeds
 }
 
-fn line(error: impl std::fmt::Display) -> String {
-    error.to_string()
-}
-
-fn cloud(path: &Path) -> Result<(), String> {
-    let info = cloud_info(path).map_err(line)?;
-    let mut bounds = info.bounds;
-    // Of other formats `cloud_info` has read every point already.
-    if info.format == CloudFormat::Las {
-        let (summary, measured) = measure_cloud(path).map_err(line)?;
-        assert_eq!(info.records, summary.records);
-        bounds = measured;
-    }
-    assert!(bounds.is_none_or(|b| b.min.iter().chain(b.max.iter()).all(|c| c.is_finite())));
-    if let Some(crs) = info.crs {
-        let _ = (Crs::parse(&crs), MapSystem::parse(&crs));
-    }
-    Ok(())
-}
-
-/// Copies a cloud as well.
-fn las(path: &Path) -> Result<(), String> {
-    cloud(path)?;
-    let nothing = |chunk: &PointChunk| Ok::<_, CloudError>(vec![PointLabel::default(); chunk.len()]);
-    let copy = path.with_file_name("copy.laz");
-    write_labelled(path, &copy, LabelColumns::Stone, nothing).map_err(line)?;
-    cloud(&copy)
-}
-
-fn ply(path: &Path) -> Result<(), String> {
-    let _ = read_mesh(path);
-    cloud(path)
-}
-
-/// Cameras whose poses may be georeferenced.
-fn map_cameras(path: &Path) -> Result<(), String> {
-    let on_map = MapFrame {
-        crs: Some("EPSG:25832".to_owned()),
-        false_origin: [450_000.0, 5_600_000.0, 0.0],
-        geoid: None,
+/// E57: a CRC-32C at the end of every page, big endian (ASTM E2807, section 9.3).
+fn page_checksums(bytes: &mut [u8]) {
+    let Some(size) = bytes.get(40..48).and_then(|b| b.try_into().ok()) else {
+        return;
     };
-    let _ = read_cameras_on_map(path, None, &on_map);
-    cameras(path)
-}
-
-fn cameras(path: &Path) -> Result<(), String> {
-    let file = read_cameras_on_map(path, None, &MapFrame::default()).map_err(line)?;
-    for view in &file.views {
-        assert!(
-            view.centre().iter().all(|c| c.is_finite()),
-            "camera {} is nowhere",
-            view.name
-        );
-        let ahead = view.cam_from_world.inverse() * Point3::new(0.1, -0.2, 5.0);
-        let _ = view.project(&ahead);
+    let size = usize::try_from(u64::from_le_bytes(size)).unwrap_or(0);
+    if !(8..=1 << 20).contains(&size) {
+        return;
     }
-    let _ = find_photos(&path.with_file_name("images"), &file);
-    Ok(())
-}
-
-fn geoid(path: &Path) -> Result<(), String> {
-    let geoid = Geoid::read(path).map_err(line)?;
-    for (latitude, longitude) in [(0.89, 0.135), (-1.5, 6.0), (f64::NAN, 0.1)] {
-        let _ = geoid.height_m(&Geodetic {
-            latitude,
-            longitude,
-            height_m: 0.0,
+    for page in bytes.chunks_exact_mut(size) {
+        let (data, checksum) = page.split_at_mut(size - 4);
+        // Castagnoli's polynomial, bit by bit.
+        let of_bit = |c: u32| c >> 1 ^ (0x82f6_3b78 & (c & 1).wrapping_neg());
+        let crc = !data.iter().fold(!0, |crc: u32, &byte| {
+            (0..8).fold(crc ^ u32::from(byte), |c, _| of_bit(c))
         });
+        checksum.copy_from_slice(&crc.to_be_bytes());
     }
-    Ok(())
-}
-
-fn coco(path: &Path) -> Result<(), String> {
-    let masks = CocoMasks::open(path).map_err(line)?;
-    for photo in masks.photos().filter(|p| p.width.max(p.height) < 4000) {
-        masks
-            .labels_for(photo.file_name, photo.width, photo.height)
-            .map_err(line)?;
-    }
-    Ok(())
-}
-
-fn regions(path: &Path) -> Result<(), String> {
-    let regions = ValidRegions::open(path).map_err(line)?;
-    regions.outside("images/0001.jpg", 64, 48).map_err(line)?;
-    Ok(())
-}
-
-fn labels(path: &Path) -> Result<(), String> {
-    let folder = path.parent().unwrap();
-    let masks = LabelFolder::open(folder).map_err(line)?;
-    let name = path.with_extension("jpg");
-    let found = masks.labels_for(&name.to_string_lossy(), 64, 48);
-    // The other seed is found beside it where this one has another name.
-    found.map(|_| ()).map_err(line)?;
-    stonewise_io::masks::read_label_png(path)
-        .map(|_| ())
-        .map_err(line)
-}
-
-fn photo(path: &Path) -> Result<(), String> {
-    let size = image_size(path).map_err(line)?;
-    let picture = read_rgb(path).map_err(line)?;
-    assert_eq!(size, (picture.width(), picture.height()));
-    Ok(())
-}
-
-fn project(path: &Path) -> Result<(), String> {
-    Project::read(path).map(|_| ()).map_err(line)
-}
-
-/// Makes a folder as the bytes of the file say, and a project of it.
-fn init(path: &Path) -> Result<(), String> {
-    const NAMES: [&str; 16] = [
-        "epoch1",
-        "epoch2",
-        "images",
-        "masks",
-        "results",
-        "a.laz",
-        "b.e57",
-        "c.txt",
-        "one.jpg",
-        "one.png",
-        "cameras.xml",
-        "reconstruction.json",
-        "masks.json",
-        "images.txt",
-        "=a\"b'.ply",
-        "\u{fc}\u{308} \n\\.xyz",
-    ];
-    let home = tempfile::tempdir_in(path.parent().unwrap()).unwrap();
-    let mut folder = home.path().to_owned();
-    for byte in fs::read(path).unwrap().into_iter().take(40) {
-        let name = folder.join(NAMES[usize::from(byte % 16)]);
-        match byte / 16 % 4 {
-            0 => folder = home.path().to_owned(),
-            1 if fs::create_dir_all(&name).is_ok() => folder = name,
-            2 => drop(fs::copy(testdata_path("clouds/plain.xyz"), &name)),
-            _ => drop(fs::write(&name, "")),
-        }
-    }
-    stonewise::init(home.path()).map(|_| ()).map_err(line)?;
-    let _ = Project::read(home.path());
-    Ok(())
 }

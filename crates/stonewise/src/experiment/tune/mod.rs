@@ -20,7 +20,6 @@ use crate::storage::store::{Keeps, StepStore};
 use std::path::Path;
 use std::sync::Arc;
 use stonewise_core::epoch::EpochId;
-use stonewise_core::evaluate::ErrorStatistics;
 use stonewise_core::parallel::in_parallel;
 use stonewise_core::progress::Progress;
 
@@ -174,7 +173,7 @@ fn recommended(points: &[TunedPoint], changes: &[usize]) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stonewise_core::evaluate::{EvaluationParams, score_motions};
+    use stonewise_core::evaluate::{ErrorStatistics, EvaluationParams, score_motions};
 
     fn point(measured: f64, rmse_m: Option<f64>) -> TunedPoint {
         // Two errors whose root mean square is that.
