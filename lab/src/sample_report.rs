@@ -394,7 +394,7 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
             file: "stonewise.toml".into(),
         },
         crs: Some(CrsRecord {
-            epsg: 25832,
+            epsg: Some(25832),
             name: "ETRS89 / UTM zone 32N".to_owned(),
             wkt: String::new(),
         }),

@@ -190,7 +190,7 @@ class Pair:
         places = {tuple(int(v) for v in row[:-1]): row[-1] for row in shapes[[*key, "geometry"]].itertuples(index=False)}
         keys = zip(*(table.column(name).to_pylist() for name in key))
         crs = self._results.record.get("crs")
-        known = f"EPSG:{crs['epsg']}" if crs else None
+        known = (f"EPSG:{crs['epsg']}" if crs["epsg"] else crs["wkt"]) if crs else None
         return geopandas.GeoDataFrame(frame, geometry=[places.get(k) for k in keys], crs=known)
 
 

@@ -40,7 +40,7 @@ def las(name, version, point_format, wkt=False, extra=False, geokeys=False):
     header.vlrs.append(VLR("some program", 7, "kept as it is", b"payload"))
     cloud = laspy.LasData(header)
     cloud.x, cloud.y, cloud.z, cloud.intensity = x, y, z, intensity
-    cloud.classification, cloud.user_data, cloud.point_source_id = i % 20, i % 250, 900 + i
+    cloud.classification, cloud.user_data, cloud.point_source_id = i % 7, i % 250, 900 + i
     cloud.return_number, cloud.number_of_returns = 1 + i % 3, np.full(N, 3)
     dims = list(cloud.point_format.dimension_names)
     if "red" in dims:

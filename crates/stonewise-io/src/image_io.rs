@@ -9,12 +9,15 @@ use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageFormat, ImageReader, Limits};
 use std::fs::File;
-use std::io::{BufWriter, Cursor};
+use std::io::{BufWriter, Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use stonewise_core::raster::{Raster, RgbImage};
 
 /// Memory that a photo may take while it is read: 300 megapixels of three 16-bit values.
 const MOST_BYTES: u64 = 2 << 30;
+
+/// First bytes of a TIFF with 64-bit offsets, which the library reads, but does not guess.
+const BIG_TIFF: [[u8; 4]; 2] = [[b'I', b'I', 43, 0], [b'M', b'M', 0, 43]];
 
 /// Why a picture could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -62,6 +65,9 @@ pub fn read_rgb(path: &Path) -> Result<RgbImage, ImageIoError> {
 /// As [`read_rgb`], of bytes.
 pub(crate) fn decode_rgb(bytes: &[u8]) -> Result<RgbImage, ImageError> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+    if BIG_TIFF.iter().any(|start| bytes.starts_with(start)) {
+        reader.set_format(ImageFormat::Tiff);
+    }
     let mut limits = Limits::default();
     limits.max_alloc = Some(MOST_BYTES);
     reader.limits(limits);
@@ -165,11 +171,59 @@ pub fn write_jpeg(path: &Path, picture: &RgbImage, quality: u8) -> Result<(), Im
     })
 }
 
-/// Whether a JPEG lacks the end-of-image marker after its last scan; decoders paint the missing part grey
-/// without a word.
+/// The first two bytes of a JPEG, and the marker at its end.
+const START: [u8; 2] = [0xff, 0xd8];
+const END: [u8; 2] = [0xff, 0xd9];
+
+/// Whether [`read_rgb`] refuses a photo as cut off; of a JPEG with nothing behind its end, only the ends are read.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn photo_is_cut_off(path: &Path) -> Result<bool, ImageIoError> {
+    let failed = |e| read_error(path, ImageError::IoError(e));
+    let mut file = File::open(path).map_err(failed)?;
+    let (mut start, mut end) = ([0; 2], [0; 2]);
+    let read = file.read_exact(&mut start).and_then(|()| {
+        file.seek(SeekFrom::End(-2))?;
+        file.read_exact(&mut end)
+    });
+    match read {
+        Ok(()) if start == START && end != END => Ok(is_cut_off(&std::fs::read(path).map_err(failed)?)),
+        Ok(()) => Ok(false),
+        // It has less than two bytes.
+        Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Ok(false),
+        Err(e) => Err(failed(e)),
+    }
+}
+
+/// Whether a JPEG ends before its end-of-image marker; decoders paint the missing part grey without a word. Bytes behind
+/// that marker do not matter.
 fn is_cut_off(bytes: &[u8]) -> bool {
-    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
-    bytes.starts_with(&[0xff, 0xd8]) && last([0xff, 0xd9]) < last([0xff, 0xda])
+    bytes.starts_with(&START) && !bytes.ends_with(&END) && end_of_image(bytes).is_none()
+}
+
+/// Where a JPEG ends, from segment to segment (ITU-T T.81, annex B).
+fn end_of_image(bytes: &[u8]) -> Option<usize> {
+    let mut place = 2;
+    loop {
+        // A marker is a byte of ones and one that is neither 0, which stands for data, nor all ones, which fill. Before it
+        // may come the data of a scan.
+        place += bytes
+            .get(place..)?
+            .windows(2)
+            .position(|pair| pair[0] == 0xff && !matches!(pair[1], 0 | 0xff))?;
+        let marker = *bytes.get(place + 1)?;
+        place += 2;
+        match marker {
+            0xd9 => return Some(place),
+            // Restarts within a scan, a second start, and a marker for programs.
+            0xd0..=0xd8 | 0x01 => {}
+            _ => {
+                let length = bytes.get(place..place + 2)?;
+                place += usize::from(u16::from_be_bytes([length[0], length[1]]));
+            }
+        }
+    }
 }
 
 /// Writes whole or not at all.

@@ -47,6 +47,11 @@ impl PhotoName {
         }
     }
 
+    /// The file's name.
+    pub(crate) fn file(&self) -> &str {
+        &self.file
+    }
+
     /// The name of another file in the same folders.
     pub(crate) fn with_file(&self, file: String) -> Self {
         Self {

@@ -18,6 +18,10 @@ messages! {
         SPACING_UNKNOWN = "spacing": "too few points to tell", "zu wenige Punkte für eine Aussage";
         SYSTEM_UNIT = "units": "the clouds' coordinate system is in {unit}: transform them to a system in metres",
             "das Koordinatensystem der Punktwolken ist in {unit}: sie in ein System in Metern umrechnen";
+        CONVERTED = "units": "the coordinates are in {unit}: they are read as metres, and all results are in metres",
+            "die Koordinaten sind in {unit}: sie werden in Meter umgerechnet, und alle Ergebnisse sind in Metern";
+        HEIGHTS_CONVERTED = "units": "eastings and northings are in {plane}, heights in {height}: both are read as metres, and all results are in metres",
+            "Rechts- und Hochwerte sind in {plane}, Höhen in {height}: beide werden in Meter umgerechnet, und alle Ergebnisse sind in Metern";
         UNIT_RATIO = "units": "the clouds are {found} times as large as those of the first epoch; {ratio} would mean that {which} is in {unit}: \
                      export its coordinates in metres",
             "die Punktwolken sind {found}-mal so groß wie die der ersten Epoche; {ratio} hieße, dass {which} in {unit} vorliegt: ihre \
@@ -70,6 +74,10 @@ messages! {
             "keine in {file} für {photos}; ein Lauf lässt diese Fotos weg";
         NO_MASK_FITS = "missing-masks": "none in {file} for any of the photos: masks are found by the names of the photos",
             "keine in {file} für irgendein Foto: Masken werden nach den Namen der Fotos gefunden";
+        NO_MASK_USABLE = "unusable-masks": "none of the masks in {file} can be used: see what is said of them",
+            "keine der Masken in {file} ist zu verwenden: siehe, was dazu gesagt wird";
+        ONE_MASK_EACH = "unusable-masks": "one single mask in each photo in {file}: every stone needs a mask, or a value, of its own",
+            "eine einzige Maske in jedem Foto in {file}: jeder Stein braucht eine eigene Maske oder einen eigenen Wert";
         MASKS: "masks", "Masken";
         CAMERAS: "cameras against cloud", "Kameras gegen Punktwolke";
         EXTENT: "extent", "Ausdehnung";
@@ -80,7 +88,10 @@ messages! {
         CLOUDS: "clouds", "Punktwolken";
         PHOTOS: "photos", "Fotos";
         DEGREES: "degrees", "Grad";
+        METRES: "metres", "Metern";
         FEET: "feet", "Fuß";
+        SIZED_FEET: "feet ({m} m)", "Fuß ({m} m)";
+        SIZED_UNIT: "units of {m} m", "Einheiten von {m} m";
         INCHES: "inches", "Zoll";
         CENTIMETRES: "centimetres", "Zentimetern";
         MILLIMETRES: "millimetres", "Millimetern";

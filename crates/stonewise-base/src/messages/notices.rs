@@ -34,6 +34,10 @@ messages! {
             "points without finite coordinates, left out: {n}",
             "Punkte ohne endliche Koordinaten, weggelassen: {n}";
 
+        UNUSED_POINTS = "unused-points":
+            "withheld points and noise (classes 7 and 18), left out: {n} of {all}",
+            "zurückgehaltene Punkte und Rauschen (Klassen 7 und 18), weggelassen: {n} von {all}";
+
         VIEWS_OF_COLOURS = "views":
             "stones are looked for in {n} views of the cloud's colours",
             "Steine werden in {n} Ansichten der Farben der Punktwolke gesucht";

@@ -1,17 +1,18 @@
 //! Some points of a cloud, as they pass by.
 
 use nalgebra::Point3;
+use std::ops::AddAssign;
 
 /// A run of points of one file, in the order of the file.
 ///
-/// Records without a finite position are left out, so `indices` may have gaps; the other columns are parallel
-/// to it. A chunk never crosses from one scan of a file into the next. Where a long part of a file holds
+/// Records without a finite position, withheld ones and noise are left out, so `indices` may have gaps; the other columns
+/// are parallel to it. A chunk never crosses from one scan of a file into the next. Where a long part of a file holds
 /// no points, chunks without points pass by.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointChunk {
     /// Index of each point's record in the file, from 0, ascending; counts across the scans of a file.
     pub indices: Vec<u64>,
-    /// Positions in the world frame, metres; the pose of a scan is applied.
+    /// Positions in the world frame, metres, whatever the unit of the file; the pose of a scan is applied.
     pub positions: Vec<Point3<f64>>,
     /// Red, green, blue, 16 bits each (8-bit colours are times 257), where the file has colours.
     pub colors: Option<Vec<[u16; 3]>>,
@@ -22,6 +23,8 @@ pub struct PointChunk {
     pub scan: Option<usize>,
     /// Number of the station or flight line of each point (LAS: point source ID), where the file has them.
     pub sources: Option<Vec<u16>>,
+    /// Records among these that are left out because they are withheld or noise (LAS: the flag, classes 7 and 18).
+    pub unused: u64,
     /// Time of each point as the file has it, seconds (LAS: GPS time), where it has times.
     pub times_s: Option<Vec<f64>>,
 }
@@ -45,6 +48,16 @@ pub struct ReadSummary {
     pub records: u64,
     /// Records left out because they have no finite position (marked invalid, without echo, NaN, infinite).
     pub skipped: u64,
+    /// Records left out because they are withheld or noise, see [`PointChunk::unused`].
+    pub unused: u64,
+}
+
+impl AddAssign for ReadSummary {
+    fn add_assign(&mut self, other: Self) {
+        self.records += other.records;
+        self.skipped += other.skipped;
+        self.unused += other.unused;
+    }
 }
 
 /// Receives chunks.

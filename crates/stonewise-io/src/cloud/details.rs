@@ -6,8 +6,10 @@ use stonewise_core::geometry::Bounds;
 
 use super::gathered::{CHUNK_POINTS, Clock, Created, FieldRange, Gathered, Head, Rounding, SourcePoints};
 use super::{
-    CloudError, CloudFormat, ReadSummary, Scan, cloud_crs, cloud_info, cloud_scans, e57_file, las, read_cloud,
+    CloudError, CloudFormat, ReadSummary, Remark, Scan, cloud_crs, cloud_remarks, cloud_scans, e57_file, las,
+    read_cloud,
 };
+use crate::crs::Units;
 
 /// A cloud file, read from end to end.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,8 +24,10 @@ pub struct CloudDetails {
     pub bounds: Option<Bounds>,
     /// Box that the header claims, where it claims one.
     pub claimed_bounds: Option<Bounds>,
-    /// Coordinate system, as [`CloudInfo::crs`](super::CloudInfo::crs).
+    /// Coordinate system as the file names it: WKT, or a code such as `EPSG:25832`.
     pub crs: Option<String>,
+    /// Units of the file's coordinates; everything here is in metres.
+    pub units: Units,
     /// Values of the points other than their positions.
     pub fields: Vec<FieldRange>,
     /// Scans that the file keeps apart.
@@ -38,6 +42,8 @@ pub struct CloudDetails {
     pub created: Option<Created>,
     /// What times count from.
     pub clock: Clock,
+    /// What is odd about the file, and how it was read all the same.
+    pub remarks: Vec<Remark>,
 }
 
 /// Reads a cloud from end to end.
@@ -46,10 +52,8 @@ pub struct CloudDetails {
 /// As [`read_cloud`].
 pub fn cloud_details(path: &Path) -> Result<CloudDetails, CloudError> {
     let format = CloudFormat::of(path)?;
-    let mut claimed_bounds = None;
     let mut gathered = Gathered::default();
     let (summary, head) = if format == CloudFormat::Las {
-        claimed_bounds = cloud_info(path)?.bounds;
         las::details(path, &mut gathered)?
     } else {
         let summary = read_cloud(path, CHUNK_POINTS, |chunk| {
@@ -63,6 +67,8 @@ pub fn cloud_details(path: &Path) -> Result<CloudDetails, CloudError> {
         let head = Head {
             format: format.to_string(),
             created,
+            crs: cloud_crs(path)?,
+            remarks: cloud_remarks(path)?,
             ..Head::default()
         };
         (summary, head)
@@ -73,8 +79,9 @@ pub fn cloud_details(path: &Path) -> Result<CloudDetails, CloudError> {
         software: head.software,
         summary,
         bounds: gathered.bounds,
-        claimed_bounds,
-        crs: cloud_crs(path)?,
+        claimed_bounds: head.claimed_bounds,
+        crs: head.crs,
+        units: head.units.unwrap_or(Units::METRES),
         fields: gathered.fields.list,
         scans: cloud_scans(path)?,
         sources: gathered.sources.into_values().collect(),
@@ -82,5 +89,6 @@ pub fn cloud_details(path: &Path) -> Result<CloudDetails, CloudError> {
         rounding: head.rounding.unwrap_or_else(|| gathered.steps.rounding()),
         created: head.created,
         clock: head.clock,
+        remarks: head.remarks,
     })
 }

@@ -5,15 +5,18 @@ use std::io::BufReader;
 use std::path::Path;
 
 use e57::{CartesianCoordinate, E57Reader, Point, PointCloud, RecordDataType, RecordName};
-use nalgebra::Point3;
+use nalgebra::{Point3, Quaternion};
 
 use super::chunk::{Chunker, PointRecord, Visit};
 use super::guard::guarded;
 use super::scan::Scan;
-use super::{CloudError, ReadSummary};
+use super::{CloudError, ReadSummary, Remark};
 
 /// Points decoded between two checks for an interruption.
 const STEP_POINTS: usize = 8192;
+
+/// Largest difference of a quaternion's length from 1 that is taken for rounding, as in the poses of images.
+const MOST_UNLIKE_ONE: f64 = 0.1;
 
 type Reader = E57Reader<BufReader<File>>;
 
@@ -25,7 +28,7 @@ pub fn read<E: From<CloudError>>(
 ) -> Result<ReadSummary, E> {
     let mut reader = open(path)?;
     let mut chunker = Chunker::new(chunk_points, false, false, visit);
-    for (number, scan) in reader.pointclouds().iter().enumerate() {
+    for (number, scan) in posed(path, &reader)?.iter().enumerate() {
         let has = |name| scan.prototype.iter().any(|record| record.name == name);
         chunker.begin_scan(number, has(RecordName::ColorRed), has(RecordName::Intensity))?;
         read_scan(path, &mut reader, scan, &mut chunker)?;
@@ -38,10 +41,7 @@ pub fn scans(path: &Path) -> Result<(Vec<Scan>, Option<String>), CloudError> {
     let reader = open(path)?;
     let scans = reader.pointclouds();
     let describe = |(number, scan): (usize, &PointCloud)| Scan {
-        name: scan
-            .name
-            .clone()
-            .unwrap_or_else(|| format!("scan {}", number + 1)),
+        name: name_of(number, scan),
         records: scan.records,
         origin: scan.transform.as_ref().map(|pose| {
             let t = &pose.translation;
@@ -59,6 +59,25 @@ pub fn scans(path: &Path) -> Result<(Vec<Scan>, Option<String>), CloudError> {
     Ok((scans.iter().enumerate().map(describe).collect(), crs))
 }
 
+/// Scans whose pose has no rotation in it.
+pub fn remarks(path: &Path) -> Result<Vec<Remark>, CloudError> {
+    let reader = open(path)?;
+    posed(path, &reader)?;
+    let scans = reader.pointclouds().into_iter().enumerate();
+    let unturned = scans.filter(|(_, scan)| {
+        scan.transform
+            .as_ref()
+            .is_some_and(|t| length(&t.rotation) == 0.0)
+    });
+    let remark = |(number, scan): (usize, PointCloud)| {
+        let name = name_of(number, &scan);
+        Remark::note(format!(
+            "the rotation of {name} is zero, which is none: read as not turned"
+        ))
+    };
+    Ok(unturned.map(remark).collect())
+}
+
 /// When a file was written, seconds of GPS time.
 pub fn created_s(path: &Path) -> Result<Option<f64>, CloudError> {
     Ok(open(path)?.creation().map(|t| t.gps_time))
@@ -69,6 +88,42 @@ fn open(path: &Path) -> Result<Reader, CloudError> {
     guarded(path, || {
         E57Reader::new(BufReader::with_capacity(1 << 20, file)).map_err(|e| e57_error(path, &e))
     })
+}
+
+fn name_of(number: usize, scan: &PointCloud) -> String {
+    scan.name
+        .clone()
+        .unwrap_or_else(|| format!("scan {}", number + 1))
+}
+
+/// The scans with rotations of unit length; a quaternion of zeros turns nothing.
+fn posed(path: &Path, reader: &Reader) -> Result<Vec<PointCloud>, CloudError> {
+    let mut scans = reader.pointclouds();
+    for (number, scan) in scans.iter_mut().enumerate() {
+        let Some(pose) = &mut scan.transform else {
+            continue;
+        };
+        let q = &mut pose.rotation;
+        let length = length(q);
+        if length == 0.0 {
+            *q = e57::Quaternion::default();
+        } else if (length - 1.0).abs() < MOST_UNLIKE_ONE {
+            for part in [&mut q.w, &mut q.x, &mut q.y, &mut q.z] {
+                *part /= length;
+            }
+        } else {
+            let reason = format!(
+                "the rotation of {} is a quaternion of length {length}, which must be 1: export it again",
+                name_of(number, scan)
+            );
+            return Err(CloudError::malformed(path, reason));
+        }
+    }
+    Ok(scans)
+}
+
+fn length(q: &e57::Quaternion) -> f64 {
+    Quaternion::new(q.w, q.x, q.y, q.z).norm()
 }
 
 fn read_scan<E: From<CloudError>>(
@@ -88,6 +143,7 @@ fn read_scan<E: From<CloudError>>(
         reader.pointcloud_simple(scan).map_err(|e| e57_error(path, &e))
     })?;
     points.intensity_to_color(false);
+    points.normalize_intensity(has_intensity_range(scan));
     loop {
         let step: Vec<Point> = guarded(path, || {
             let step = points.by_ref().take(STEP_POINTS).collect::<Result<_, _>>();
@@ -100,6 +156,22 @@ fn read_scan<E: From<CloudError>>(
             chunker.push(record(point))?;
         }
     }
+}
+
+/// Whether a scan says between which values its intensities lie; the range of all floats is none.
+fn has_intensity_range(scan: &PointCloud) -> bool {
+    let limits = scan.intensity_limits.as_ref();
+    let are_stated = limits.is_some_and(|l| l.intensity_min.is_some() && l.intensity_max.is_some());
+    let field = scan
+        .prototype
+        .iter()
+        .find(|record| record.name == RecordName::Intensity);
+    are_stated
+        || field.is_some_and(|field| match field.data_type {
+            RecordDataType::Single { min, max } => min.is_some() && max.is_some(),
+            RecordDataType::Double { min, max } => min.is_some() && max.is_some(),
+            RecordDataType::Integer { .. } | RecordDataType::ScaledInteger { .. } => true,
+        })
 }
 
 /// Whether values of a type take no bits.

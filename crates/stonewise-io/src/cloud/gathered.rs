@@ -6,8 +6,9 @@ use nalgebra::Point3;
 use serde::Serialize;
 use stonewise_core::geometry::Bounds;
 
-use super::PointChunk;
 use super::spacing::Spacing;
+use super::{PointChunk, Remark};
+use crate::crs::Units;
 
 /// Points per chunk of a pass that only looks.
 pub(super) const CHUNK_POINTS: usize = 100_000;
@@ -84,6 +85,11 @@ pub(super) struct Head {
     pub created: Option<Created>,
     pub clock: Clock,
     pub rounding: Option<Rounding>,
+    /// As the file names it.
+    pub crs: Option<String>,
+    pub units: Option<Units>,
+    pub claimed_bounds: Option<Bounds>,
+    pub remarks: Vec<Remark>,
 }
 
 /// Fields in the order in which they came up, with their ranges.

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use nalgebra::Point3;
 use stonewise_core::geometry::Bounds;
 
 use super::gathered::{CHUNK_POINTS, Created};
 use super::scan::Scan;
-use super::{CloudError, CloudFormat, ReadSummary, e57_file, las, ply, ptx, read_cloud, text};
+use super::{CloudError, CloudFormat, ReadSummary, Remark, e57_file, las, ply, ptx, read_cloud, text};
+use crate::crs::Units;
 
 /// Description of a cloud file.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,12 +16,16 @@ pub struct CloudInfo {
     pub format: CloudFormat,
     /// Number of records, points without a position included.
     pub records: u64,
-    /// Box around the points, world frame; `None` without points. LAS: as the header says.
+    /// Box around the points, world frame, metres; `None` without points. LAS: as the header says.
     pub bounds: Option<Bounds>,
-    /// Coordinate system, where the file names one: WKT, or a code such as `EPSG:25832`.
+    /// Coordinate system, where the file names one, in metres: see [`cloud_crs`].
     pub crs: Option<String>,
+    /// Units of the file's coordinates; LAS alone states them.
+    pub units: Units,
     /// Scans, where the file keeps them apart.
     pub scans: Vec<Scan>,
+    /// What is odd about the file, and how it was read all the same.
+    pub remarks: Vec<Remark>,
 }
 
 /// Describes a cloud file.
@@ -41,7 +45,9 @@ pub fn cloud_info(path: &Path) -> Result<CloudInfo, CloudError> {
         records: summary.records,
         bounds,
         crs: cloud_crs(path)?,
+        units: Units::METRES,
         scans: cloud_scans(path)?,
+        remarks: cloud_remarks(path)?,
     })
 }
 
@@ -75,7 +81,9 @@ pub fn measure_cloud(path: &Path) -> Result<(ReadSummary, Option<Bounds>), Cloud
     Ok((summary, bounds))
 }
 
-/// The coordinate system that a file names, from its head alone: WKT, or a code such as `EPSG:25832`.
+/// The coordinate system of a file's points as they are read, from its head alone: WKT, or a code such as `EPSG:25832`.
+///
+/// Positions are read in metres, so a system in other units comes as the same projection in metres.
 ///
 /// # Errors
 /// The file cannot be read, or its head is damaged.
@@ -84,6 +92,19 @@ pub fn cloud_crs(path: &Path) -> Result<Option<String>, CloudError> {
         CloudFormat::Las => Ok(las::Layout::open(path)?.crs()),
         CloudFormat::E57 => Ok(e57_file::scans(path)?.1),
         CloudFormat::Ptx | CloudFormat::Ply | CloudFormat::Text => Ok(None),
+    }
+}
+
+/// What is odd about a file, and how it is read all the same, from its head and for text its first point.
+///
+/// # Errors
+/// The file cannot be read, or its head is damaged.
+pub fn cloud_remarks(path: &Path) -> Result<Vec<Remark>, CloudError> {
+    match CloudFormat::of(path)? {
+        CloudFormat::Las => Ok(las::Layout::open(path)?.remarks),
+        CloudFormat::E57 => e57_file::remarks(path),
+        CloudFormat::Text => text::remarks(path),
+        CloudFormat::Ply | CloudFormat::Ptx => Ok(Vec::new()),
     }
 }
 
@@ -125,17 +146,13 @@ pub fn claimed_records(path: &Path) -> Result<Option<u64>, CloudError> {
 
 fn las_info(path: &Path) -> Result<CloudInfo, CloudError> {
     let layout = las::Layout::open(path)?;
-    let records = layout.header.number_of_points();
-    let ::las::Bounds { min, max } = layout.header.bounds();
-    let bounds = Bounds {
-        min: Point3::new(min.x, min.y, min.z),
-        max: Point3::new(max.x, max.y, max.z),
-    };
     Ok(CloudInfo {
         format: CloudFormat::Las,
-        records,
-        bounds: (records > 0).then_some(bounds),
+        records: layout.header.number_of_points(),
+        bounds: layout.bounds(),
         crs: layout.crs(),
+        units: layout.system.units,
         scans: Vec::new(),
+        remarks: layout.remarks,
     })
 }

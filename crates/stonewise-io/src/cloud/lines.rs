@@ -14,6 +14,8 @@ pub(super) struct Lines {
     path: PathBuf,
     reader: BufReader<File>,
     line: Vec<u8>,
+    /// The line as text, where it is not in UTF-8.
+    decoded: String,
     number: u64,
 }
 
@@ -24,6 +26,7 @@ impl Lines {
             path: path.to_owned(),
             reader: BufReader::with_capacity(1 << 20, file),
             line: Vec::new(),
+            decoded: String::new(),
             number: 0,
         })
     }
@@ -61,11 +64,21 @@ impl Lines {
         Ok(true)
     }
 
-    fn text(&self) -> Result<&str, CloudError> {
-        match str::from_utf8(&self.line) {
-            Ok(line) => Ok(line.trim_start_matches('\u{feff}').trim()),
-            Err(_) => Err(self.error("the line is not text in UTF-8")),
+    /// In UTF-8, else in Latin-1, which programs on Windows write into comments.
+    fn text(&mut self) -> Result<&str, CloudError> {
+        if str::from_utf8(&self.line).is_err() {
+            if self
+                .line
+                .iter()
+                .any(|b| b.is_ascii_control() && !b.is_ascii_whitespace())
+            {
+                return Err(self.error("the line is no text: save the file as text in UTF-8"));
+            }
+            self.decoded = self.line.iter().map(|&b| char::from(b)).collect();
+            return Ok(self.decoded.trim());
         }
+        let line = str::from_utf8(&self.line).unwrap_or_default();
+        Ok(line.trim_start_matches('\u{feff}').trim())
     }
 
     /// Bytes of the file after the line that was read last.

@@ -1,6 +1,7 @@
 //! Point clouds of every usual format in, results out.
 
 mod chunk;
+mod colour_scale;
 mod details;
 mod e57_file;
 mod error;
@@ -18,6 +19,7 @@ mod ply;
 mod points;
 mod ptx;
 mod read;
+mod remark;
 mod scalar;
 mod scan;
 mod spacing;
@@ -30,7 +32,9 @@ pub use error::CloudError;
 pub use extra_bytes::{Dimension, ExtraType};
 pub use format::{CloudFormat, is_unread_cloud};
 pub use gathered::{Clock, Created, FieldRange, Rounding, SourcePoints};
-pub use info::{CloudInfo, claimed_records, cloud_crs, cloud_date, cloud_info, cloud_scans, measure_cloud};
+pub use info::{
+    CloudInfo, claimed_records, cloud_crs, cloud_date, cloud_info, cloud_remarks, cloud_scans, measure_cloud,
+};
 pub use label::{LabelColumns, PointLabel, PointMotion};
 pub use labelled::{select_points, write_labelled};
 pub use ply::read_mesh;
@@ -39,4 +43,5 @@ pub use points::{
     write_points_laz,
 };
 pub use read::read_cloud;
+pub use remark::Remark;
 pub use scan::Scan;

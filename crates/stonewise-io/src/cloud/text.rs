@@ -5,19 +5,21 @@ use std::path::Path;
 use nalgebra::Point3;
 
 use super::chunk::{Chunker, PointRecord, Visit};
+use super::colour_scale::{LOOK_POINTS, Seen, to_16_bits};
 use super::lines::Lines;
 use super::scan::Scan;
-use super::{CloudError, ReadSummary};
+use super::{CloudError, ReadSummary, Remark};
 
 /// Passes all points of a text file to `visit`, one point per line.
 ///
-/// Columns are separated by semicolons, else by commas, else by spaces or tabs, as the first point shows;
-/// with semicolons a comma may stand for the decimal point. Lines that begin with `#`, `//` or `%` are
-/// comments. A header, also one in a comment, names the columns (x, y, z, r or red, g or green, b or blue,
-/// intensity or i). Without one they are x, y, z and, where the first point has three integers from 0 to 255
-/// there, colours; with seven columns, and with four in PTS files, an intensity comes before the colours.
-/// Colours are 8-bit. A line with nothing but a count is skipped before the first point. In PTS files a count
-/// begins a scan, wherever it stands, and must be right.
+/// Columns are separated by semicolons, else by commas, else by spaces or tabs, as the first point shows; with
+/// semicolons, spaces or tabs a comma may stand for the decimal point. Separators at the end of a line add nothing. Lines
+/// that begin with `#`, `//` or `%` are comments. A header, also one in a comment, names the columns (x, y, z, r or red,
+/// g or green, b or blue, intensity or i); others may hold anything. Without a header the columns are x, y, z and, where the first points have whole numbers
+/// there that are not all 0 or 1, colours; a seventh column is an intensity, behind the colours as CloudCompare writes it,
+/// or in front of them where only that fits and in PTS files, where it is also the fourth of four. Colours go to 255, to
+/// 65535 where the first points have larger ones, or to 1 where they are fractions. A line with nothing but a count is
+/// skipped before the first point. In PTS files a count begins a scan, wherever it stands, and must be right.
 pub fn read<E: From<CloudError>>(
     path: &Path,
     chunk_points: usize,
@@ -79,6 +81,14 @@ pub fn scans(path: &Path) -> Result<Vec<Scan>, CloudError> {
     Ok(scans)
 }
 
+/// Says which column is east where the header names y before x, as surveyors do whose y points east.
+pub fn remarks(path: &Path) -> Result<Vec<Remark>, CloudError> {
+    let is_odd = find_columns(path)?.is_some_and(|(columns, _)| columns.y_before_x);
+    let text = "its header names Y before X; columns are read by their names, so X points east and Y north: if Y points east, \
+                rename both, or the cloud is mirrored";
+    Ok(is_odd.then(|| Remark::note(text)).into_iter().collect())
+}
+
 fn is_pts(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pts"))
 }
@@ -126,13 +136,19 @@ impl Parts {
 }
 
 /// Where the values stand in a line.
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 struct Columns {
     /// `None` for spaces and tabs.
     separator: Option<char>,
     position: [usize; 3],
     color: Option<[usize; 3]>,
+    /// Multiplies colours to 16 bits.
+    color_factor: f64,
     intensity: Option<usize>,
+    /// The header names y before x.
+    y_before_x: bool,
+    /// Columns of the header; 0 without one.
+    named: usize,
 }
 
 /// The columns and the number of the first line that is a point; `None` where there is no point at all.
@@ -142,23 +158,130 @@ fn find_columns(path: &Path) -> Result<Option<(Columns, u64)>, CloudError> {
     while let Some(line) = lines.next()? {
         if let Some(text) = comment(line) {
             named = named.or_else(|| Columns::named(text));
-        } else if line.is_empty() || is_count(line) {
             continue;
-        } else if let Some(unnamed) = Columns::unnamed(line, is_pts(path)) {
-            let separator = unnamed.separator;
-            let columns = named.map_or(unnamed, |named| Columns { separator, ..named });
-            return Ok(Some((columns, lines.number())));
-        } else if named.is_none() {
+        }
+        if line.is_empty() || is_count(line) {
+            continue;
+        }
+        let separator = separator(line);
+        if let Some(header) = &mut named {
+            header.separator = separator;
+            if let Err(reason) = header.record(line) {
+                return Err(lines.error(format!("not a point: {reason}")));
+            }
+        } else if numbers(line, separator).is_none_or(|n| n.len() < 3) {
             named = Columns::named(line);
             if named.is_none() {
                 let reason = "neither three numbers nor a header with columns x, y and z";
                 return Err(lines.error(reason));
             }
-        } else {
-            return Err(lines.error("not a point: expected numbers after the header"));
+            continue;
         }
+        let (line, first) = (line.to_owned(), lines.number());
+        let look = Look::at(line, separator, &mut lines)?;
+        let columns = named.unwrap_or_else(|| look.columns(separator, is_pts(path)));
+        if look.has_decimal_commas(&columns) {
+            let reason = "whole numbers between commas: if commas are decimal signs, export with points or \
+                          semicolons; if the coordinates are whole, write them as 1.0";
+            return Err(CloudError::Line {
+                path: path.to_owned(),
+                line: first,
+                reason: reason.to_owned(),
+            });
+        }
+        let color_factor = look.color_factor(&columns);
+        return Ok(Some((
+            Columns {
+                color_factor,
+                ..columns
+            },
+            first,
+        )));
     }
     Ok(None)
+}
+
+/// What the first points of a file have in their columns.
+#[derive(Default)]
+struct Look {
+    columns: Vec<Seen>,
+    /// A number has a decimal point.
+    has_point: bool,
+}
+
+impl Look {
+    /// Looks at a line and those after it; lines that are no points are met again while the file is read.
+    fn at(first: String, separator: Option<char>, lines: &mut Lines) -> Result<Self, CloudError> {
+        let mut look = Self::default();
+        look.add(&first, separator);
+        for _ in 1..LOOK_POINTS {
+            match lines.next()? {
+                Some(line) if comment(line).is_none() => look.add(line, separator),
+                Some(_) => {}
+                None => break,
+            }
+        }
+        Ok(look)
+    }
+
+    fn add(&mut self, line: &str, separator: Option<char>) {
+        for (place, cell) in cells(line, separator).enumerate() {
+            if let Some(value) = number(cell, separator) {
+                self.columns
+                    .resize(self.columns.len().max(place + 1), Seen::default());
+                self.columns[place].add(value);
+                self.has_point |= cell.contains('.');
+            }
+        }
+    }
+
+    /// Columns by the values of the first points.
+    fn columns(&self, separator: Option<char>, is_pts: bool) -> Columns {
+        let fits = |start: usize, white: f64| {
+            self.columns.get(start..start + 3).is_some_and(|all| {
+                let is_color = |c: &Seen| c.is_whole && c.largest <= white;
+                // A normal such as 0 0 1 is no colour.
+                all.iter().all(is_color) && all.iter().any(|c| c.largest > 1.0)
+            })
+        };
+        let starts: &[usize] = match self.columns.len() {
+            7 if is_pts => &[4],
+            7 => &[3, 4],
+            _ => &[3],
+        };
+        let color = [255.0, 65535.0]
+            .into_iter()
+            .find_map(|white| starts.iter().copied().find(|&s| fits(s, white)));
+        let intensity = match (self.columns.len(), color) {
+            (7, Some(3)) => Some(6),
+            (7, _) => Some(3),
+            (4, _) if is_pts => Some(3),
+            _ => None,
+        };
+        Columns {
+            separator,
+            position: [0, 1, 2],
+            color: color.map(|start| [start, start + 1, start + 2]),
+            color_factor: 257.0,
+            intensity,
+            y_before_x: false,
+            named: 0,
+        }
+    }
+
+    fn color_factor(&self, columns: &Columns) -> f64 {
+        let seen = |column: usize| self.columns.get(column).copied().unwrap_or_default();
+        columns
+            .color
+            .map_or(257.0, |channels| to_16_bits(channels.map(seen), false))
+    }
+
+    /// Whether commas separate the whole part of each number from its decimals.
+    fn has_decimal_commas(&self, columns: &Columns) -> bool {
+        let count = self.columns.len();
+        let may_be = count >= 6 && count.is_multiple_of(2) && count != columns.named;
+        columns.separator == Some(',') && !self.has_point && may_be
+    }
 }
 
 impl Columns {
@@ -172,34 +295,18 @@ impl Columns {
             place(&["g", "green"]),
             place(&["b", "blue"]),
         ];
+        let [x, y, z] = [place(&["x"])?, place(&["y"])?, place(&["z"])?];
         Some(Self {
             separator,
-            position: [place(&["x"])?, place(&["y"])?, place(&["z"])?],
+            position: [x, y, z],
             color: match color {
                 [Some(r), Some(g), Some(b)] => Some([r, g, b]),
                 _ => None,
             },
+            color_factor: 257.0,
             intensity: place(&["i", "intensity", "reflectance"]),
-        })
-    }
-
-    /// Columns by the values of the first point.
-    fn unnamed(line: &str, is_pts: bool) -> Option<Self> {
-        let separator = separator(line);
-        let values: Option<Vec<f64>> = cells(line, separator).map(|c| number(c, separator)).collect();
-        let values = values.filter(|v| v.len() >= 3)?;
-        let intensity = (values.len() == 7 || (is_pts && values.len() == 4)).then_some(3);
-        let start = if values.len() == 7 { 4 } else { 3 };
-        let color = values.get(start..start + 3).is_some_and(|v| {
-            let is_byte = |c: &f64| (0.0..=255.0).contains(c) && c.fract() == 0.0;
-            // A normal such as 0 0 1 is no colour.
-            v.iter().all(is_byte) && v.iter().any(|&c| c > 1.0)
-        });
-        Some(Self {
-            separator,
-            position: [0, 1, 2],
-            color: color.then_some([start, start + 1, start + 2]),
-            intensity,
+            y_before_x: y < x,
+            named: names.len(),
         })
     }
 
@@ -215,7 +322,10 @@ impl Columns {
         };
         let [x, y, z] = self.position;
         let position = Point3::new(value(x)?, value(y)?, value(z)?);
-        let channel = |column| value(column).map(|v| (v.clamp(0.0, 255.0) * 257.0).round() as u16);
+        let channel = |column| {
+            let bits = value(column)? * self.color_factor;
+            Ok::<_, String>(bits.clamp(0.0, 65535.0).round() as u16)
+        };
         let color = match self.color {
             Some([r, g, b]) => Some([channel(r)?, channel(g)?, channel(b)?]),
             None => None,
@@ -242,23 +352,39 @@ fn is_count(line: &str) -> bool {
 }
 
 fn separator(line: &str) -> Option<char> {
-    [';', ','].into_iter().find(|&s| line.contains(s))
+    // Numbers between spaces or tabs, with a comma for the decimal point.
+    let mut words = line.split_ascii_whitespace().take(3);
+    let are_numbers = words.clone().count() == 3 && words.all(|word| number(word, None).is_some());
+    match are_numbers {
+        true => None,
+        false => [';', ','].into_iter().find(|&s| line.contains(s)),
+    }
 }
 
 fn cells(line: &str, separator: Option<char>) -> impl Iterator<Item = &str> {
     let (words, parts) = match separator {
         None => (Some(line.split_ascii_whitespace()), None),
-        Some(separator) => (None, Some(line.split(separator).map(str::trim))),
+        Some(separator) => {
+            let line = line.trim_end_matches(separator);
+            (None, Some(line.split(separator).map(str::trim)))
+        }
     };
     let cells = words.into_iter().flatten().chain(parts.into_iter().flatten());
     cells.map(|cell| cell.trim_matches('"'))
 }
 
+fn numbers(line: &str, separator: Option<char>) -> Option<Vec<f64>> {
+    cells(line, separator)
+        .map(|cell| number(cell, separator))
+        .collect()
+}
+
 fn number(cell: &str, separator: Option<char>) -> Option<f64> {
-    if separator == Some(';') && cell.contains(',') {
-        return cell.replace(',', ".").parse().ok();
+    match separator {
+        Some(',') => cell.parse().ok(),
+        _ if cell.ends_with(',') => None,
+        _ => cell.replacen(',', ".", 1).parse().ok(),
     }
-    cell.parse().ok()
 }
 
 /// A column's name without its unit.

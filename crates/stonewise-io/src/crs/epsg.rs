@@ -43,12 +43,6 @@ pub fn compound(code: u32) -> Option<Compound> {
     REGISTER.compound(code)
 }
 
-/// The size of the unit of eastings and northings of a projected or compound system, metres.
-pub fn unit_m(code: u32) -> Option<f64> {
-    let horizontal = || projected(compound(code)?.horizontal);
-    projected(code).or_else(horizontal)?.metres.parse().ok()
-}
-
 /// A geographic system; numbers are texts, as the table has them.
 pub struct Geographic {
     pub code: u32,

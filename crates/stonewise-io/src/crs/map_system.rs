@@ -86,9 +86,7 @@ impl MapSystem {
             }
             "GEOCCS" => Self::earthly(node, node, Coordinates::Geocentric).map(Some),
             "GEODCRS" | "GEODETICCRS" => {
-                let axes = node.child(&["CS"]).and_then(|cs| cs.values.first());
-                let is_cartesian = axes.is_some_and(|kind| kind.eq_ignore_ascii_case("cartesian"));
-                let coordinates = if is_cartesian {
+                let coordinates = if node.is_cartesian() {
                     Coordinates::Geocentric
                 } else {
                     Coordinates::Geographic
@@ -317,12 +315,12 @@ impl Parameters<'_> {
             "longitudeofcenter",
             "longitudeofprojectioncentre",
         ];
-        let east = self.plain(&[
+        let east = self.length(&[
             "falseeasting",
             "eastingatfalseorigin",
             "eastingatprojectioncentre",
         ]);
-        let north = self.plain(&[
+        let north = self.length(&[
             "falsenorthing",
             "northingatfalseorigin",
             "northingatprojectioncentre",
@@ -374,6 +372,12 @@ impl Parameters<'_> {
     fn plain(&self, names: &[&str]) -> Option<f64> {
         let value: f64 = self.node(names)?.values.get(1)?.parse().ok()?;
         Some(value).filter(|v| v.is_finite())
+    }
+
+    /// Metres: in WKT 2 a parameter may have a unit of its own.
+    fn length(&self, names: &[&str]) -> Option<f64> {
+        let own = self.node(names)?.child(&["LENGTHUNIT", "UNIT"]);
+        Some(self.plain(names)? * own.and_then(Node::factor).unwrap_or(1.0))
     }
 
     fn angle(&self, names: &[&str]) -> Option<f64> {

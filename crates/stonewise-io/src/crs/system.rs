@@ -3,42 +3,42 @@
 use super::epsg::definition;
 use super::wkt::Node;
 
-/// A coordinate reference system of the EPSG register.
+/// A coordinate reference system that is tied to the earth.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Crs {
-    /// EPSG code.
-    pub epsg: i32,
+    /// Its code in the EPSG register, where it has one.
+    pub epsg: Option<i32>,
     /// Name.
     pub name: String,
-    /// Definition as WKT 1 or WKT 2; empty where only the code is known, and it is not one of the common ones.
+    /// Definition as WKT 1 or WKT 2; empty where only the code is known, and the table does not have it.
     pub wkt: String,
 }
 
 impl Crs {
-    /// The system that a text names: WKT 1 or 2 with the authority's code, `EPSG:25832` or `EPSG:25832+7837`.
+    /// The system that a text names: WKT 1 or 2, `EPSG:25832` or `EPSG:25832+7837`.
     ///
-    /// Of a compound system without a code of its own, the horizontal part counts. `None` where the text
-    /// holds no EPSG code: a local frame.
+    /// Of a compound system without a code of its own, the horizontal part counts. `None` for a local frame, and for
+    /// what is no text of a system.
     pub fn parse(text: &str) -> Option<Self> {
         let text = text.trim();
         if let Some(code) = text.strip_prefix("EPSG:") {
             return match definition(code) {
                 Some(wkt) => Self::parse(&wkt),
                 None => Some(Self {
-                    epsg: code.trim().parse().ok()?,
+                    epsg: Some(code.trim().parse().ok()?),
                     name: text.to_owned(),
                     wkt: String::new(),
                 }),
             };
         }
         let root = Node::parse(text)?;
-        let crs = if root.code().is_some() {
+        let crs = if root.code().is_some() || root.is_crs() {
             &root
         } else {
-            root.children.iter().find(|c| c.code().is_some() && c.is_crs())?
+            root.children.iter().find(|c| c.is_crs())?
         };
         Some(Self {
-            epsg: crs.code()?,
+            epsg: crs.code(),
             name: crs.name()?,
             wkt: crs.text.to_owned(),
         })
@@ -46,10 +46,9 @@ impl Crs {
 
     /// The definition, or the code where there is none: [`Crs::parse`] gives the same system again.
     pub fn text(&self) -> String {
-        if self.wkt.is_empty() {
-            format!("EPSG:{}", self.epsg)
-        } else {
-            self.wkt.clone()
+        match self.epsg {
+            Some(code) if self.wkt.is_empty() => format!("EPSG:{code}"),
+            _ => self.wkt.clone(),
         }
     }
 }
@@ -64,11 +63,14 @@ mod tests {
     #[test]
     fn the_code_is_the_systems_own_and_not_that_of_its_parts() {
         let crs = Crs::parse(UTM).unwrap();
-        assert_eq!((crs.epsg, crs.name.as_str()), (25832, "ETRS89 / UTM zone 32N"));
+        assert_eq!(
+            (crs.epsg, crs.name.as_str()),
+            (Some(25832), "ETRS89 / UTM zone 32N")
+        );
         assert_eq!(crs.wkt, UTM);
         let wkt2 = r#"PROJCRS["NAD83 / Texas", BASEGEOGCRS["NAD83", ID["EPSG",4269]], CS[Cartesian,2], ID["EPSG",2277]]"#;
-        assert_eq!(Crs::parse(wkt2).unwrap().epsg, 2277);
-        assert_eq!(Crs::parse("EPSG:31467").unwrap().epsg, 31467);
+        assert_eq!(Crs::parse(wkt2).unwrap().epsg, Some(2277));
+        assert_eq!(Crs::parse("EPSG:31467").unwrap().epsg, Some(31467));
     }
 
     #[test]
@@ -77,8 +79,15 @@ mod tests {
             r#"COMPD_CS["both",{UTM},VERT_CS["DHHN2016",VERT_DATUM["x",2005],AUTHORITY["EPSG","7837"]]]"#
         );
         let crs = Crs::parse(&compound).unwrap();
-        assert_eq!(crs.epsg, 25832);
+        assert_eq!(crs.epsg, Some(25832));
         assert_eq!(crs.wkt, UTM);
+    }
+
+    #[test]
+    fn a_system_of_the_users_own_is_its_definition() {
+        let own = UTM.replace(",AUTHORITY[\"EPSG\",\"25832\"]]", "]");
+        let crs = Crs::parse(&own).unwrap();
+        assert_eq!((crs.epsg, crs.text()), (None, own));
     }
 
     #[test]

@@ -80,11 +80,46 @@ impl<'a> Node<'a> {
         Some(factor).filter(|f| f.is_finite() && *f > 0.0)
     }
 
+    /// Whether it is a system of its own that is tied to the earth.
     pub fn is_crs(&self) -> bool {
         let keyword = self.keyword.to_ascii_uppercase();
         [
-            "PROJCS", "PROJCRS", "GEOGCS", "GEOGCRS", "GEODCRS", "GEOCCS", "BOUNDCRS",
+            "PROJCS",
+            "PROJCRS",
+            "PROJECTEDCRS",
+            "GEOGCS",
+            "GEOGCRS",
+            "GEOGRAPHICCRS",
+            "GEODCRS",
+            "GEODETICCRS",
+            "GEOCCS",
+            "BOUNDCRS",
         ]
         .contains(&keyword.as_str())
+    }
+
+    /// Whether its axes are x, y and z (WKT 2).
+    pub fn is_cartesian(&self) -> bool {
+        let axes = self.child(&["CS"]).and_then(|cs| cs.values.first());
+        axes.is_some_and(|kind| kind.eq_ignore_ascii_case("cartesian"))
+    }
+
+    /// The text with other texts for some children; an empty one takes the child away.
+    pub fn edited(&self, edit: &dyn Fn(&Self) -> Option<String>) -> String {
+        let mut out = String::new();
+        let mut done = 0;
+        for child in &self.children {
+            let begin = child.text.as_ptr().addr() - self.text.as_ptr().addr();
+            if let Some(new) = edit(child) {
+                let before = &self.text[done..begin];
+                out += match new.is_empty() {
+                    true => before.trim_end().trim_end_matches(','),
+                    false => before,
+                };
+                out += &new;
+                done = begin + child.text.len();
+            }
+        }
+        out + &self.text[done..]
     }
 }

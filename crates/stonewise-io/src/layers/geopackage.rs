@@ -4,6 +4,7 @@ use super::geometry::encode;
 use super::schema::{APPLICATION_ID, TABLES, USER_VERSION, rtree, rtree_triggers};
 use super::{Layer, LayerStyle};
 use crate::atomic::write_atomically;
+use crate::crs::Crs;
 #[cfg(doc)]
 use crate::table::Table;
 use crate::table::{Column, TableError};
@@ -13,6 +14,9 @@ use std::path::{Path, PathBuf};
 
 /// Reference system of local frames.
 const UNDEFINED_CARTESIAN: i32 = -1;
+/// Number of a system without a code of the EPSG, beyond all of those, as GDAL numbers them. The layers of a file have one
+/// system at most.
+const OWN_SYSTEM: i32 = 100_000;
 
 /// Why layers could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -123,8 +127,10 @@ fn fill(path: &Path, layers: &[Layer], last_change: &str) -> rusqlite::Result<()
 }
 
 fn add_layer(file: &Connection, layer: &Layer, last_change: &str) -> rusqlite::Result<()> {
-    let srs = layer.crs.as_ref().map_or(UNDEFINED_CARTESIAN, |c| c.epsg);
+    let number = |crs: &Crs| crs.epsg.unwrap_or(OWN_SYSTEM);
+    let srs = layer.crs.as_ref().map_or(UNDEFINED_CARTESIAN, number);
     if let Some(crs) = &layer.crs {
+        let organization = if crs.epsg.is_some() { "EPSG" } else { "NONE" };
         // A definition is mandatory; readers look a code of the EPSG up by themselves.
         let definition = if crs.wkt.is_empty() {
             "undefined"
@@ -132,8 +138,8 @@ fn add_layer(file: &Connection, layer: &Layer, last_change: &str) -> rusqlite::R
             crs.wkt.as_str()
         };
         file.execute(
-            "INSERT OR IGNORE INTO gpkg_spatial_ref_sys VALUES (?1, ?2, 'EPSG', ?2, ?3, NULL)",
-            params![crs.name, crs.epsg, definition],
+            "INSERT OR IGNORE INTO gpkg_spatial_ref_sys VALUES (?1, ?2, ?4, ?2, ?3, NULL)",
+            params![crs.name, srs, definition, organization],
         )?;
     }
 

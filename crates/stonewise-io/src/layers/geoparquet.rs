@@ -13,8 +13,8 @@ const GEOMETRY: &str = "geometry";
 
 /// Writes a layer as a table whose last column, `geometry`, is the feature as well-known binary.
 ///
-/// The metadata entry `geo` names the reference system as PROJJSON: null, which means unknown, for local frames and for
-/// systems that [`projjson`] does not have. Coordinates are x, y, z whatever the order of the system's axes, as the
+/// The metadata entry `geo` names the reference system as PROJJSON: null, which means unknown, for local frames, for
+/// systems without a code and for those that [`projjson`] does not have. Coordinates are x, y, z whatever the order of the system's axes, as the
 /// format demands. A feature with too few or infinite vertices has no geometry.
 ///
 /// # Errors
@@ -44,7 +44,7 @@ fn described(layer: &Layer, geometries: &[Option<Vec<u8>>]) -> Value {
         Geometry::LineStringZ => "LineString Z",
         Geometry::LineString => "LineString",
     };
-    let code = layer.crs.as_ref().and_then(|crs| u32::try_from(crs.epsg).ok());
+    let code = layer.crs.as_ref().and_then(|crs| u32::try_from(crs.epsg?).ok());
     let mut column = json!({ "encoding": "WKB", "geometry_types": [kind], "crs": code.and_then(projjson) });
     let there = layer.vertices.iter().zip(geometries);
     let there = there.filter(|(_, geometry)| geometry.is_some());

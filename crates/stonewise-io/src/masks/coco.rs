@@ -1,8 +1,11 @@
 //! COCO instance annotations.
 
+use super::json_text::read_json_text;
 use super::{InstanceInfo, LabelledPhoto, MaskError};
 use crate::photo_name::{Fit, PhotoName};
 use serde::Deserialize;
+use serde::de::IgnoredAny;
+use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use stonewise_core::raster::{Raster, Rle, fill_polygon};
@@ -12,7 +15,9 @@ use stonewise_core::raster::{Raster, Rle, fill_polygon};
 pub struct CocoMasks {
     path: PathBuf,
     images: Vec<RawImage>,
-    annotations: BTreeMap<u64, Vec<RawAnnotation>>,
+    /// By the image's id.
+    annotations: BTreeMap<String, Vec<RawAnnotation>>,
+    remarks: Vec<String>,
 }
 
 /// A photo that a COCO file lists.
@@ -38,7 +43,7 @@ struct RawFile {
 
 #[derive(Clone, Debug, Deserialize)]
 struct RawImage {
-    id: u64,
+    id: Value,
     file_name: String,
     width: u32,
     height: u32,
@@ -46,33 +51,32 @@ struct RawImage {
 
 #[derive(Deserialize)]
 struct RawCategory {
-    id: u64,
+    id: Value,
     name: String,
 }
 
-#[derive(Clone, Debug, Deserialize)]
+/// Programs write numbers, texts, true and null for the same thing; what cannot be used is named when it is.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
 struct RawAnnotation {
-    #[serde(default)]
-    id: u64,
-    image_id: u64,
-    #[serde(default)]
-    category_id: Option<u64>,
-    #[serde(default)]
+    id: Value,
+    image_id: Value,
+    category_id: Value,
     segmentation: RawSegmentation,
     /// Left, top, width, height, pixels.
-    bbox: Option<[f64; 4]>,
-    #[serde(default)]
-    iscrowd: u8,
-    score: Option<f64>,
+    bbox: Value,
+    iscrowd: Value,
+    score: Value,
     /// Any number; only positive whole ones name a stone.
-    #[serde(default)]
-    stone_id: serde_json::Value,
+    stone_id: Value,
 }
 
 #[derive(Clone, Debug, Deserialize)]
 #[serde(untagged)]
 enum RawSegmentation {
     Polygons(Vec<Vec<f64>>),
+    /// One polygon without the list around it.
+    Polygon(Vec<f64>),
     /// Size is (height, width).
     Runs {
         size: [u32; 2],
@@ -82,11 +86,28 @@ enum RawSegmentation {
         size: [u32; 2],
         counts: String,
     },
+    /// Null.
+    Nothing(()),
+    Other(IgnoredAny),
 }
 
 impl Default for RawSegmentation {
     fn default() -> Self {
-        Self::Polygons(Vec::new())
+        Self::Nothing(())
+    }
+}
+
+impl RawAnnotation {
+    fn is_crowd(&self) -> bool {
+        self.iscrowd == Value::Bool(true) || self.iscrowd.as_f64().is_some_and(|n| n != 0.0)
+    }
+}
+
+/// An id as a text: numbers and texts of the same digits are one.
+fn id(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        value => value.to_string(),
     }
 }
 
@@ -96,15 +117,14 @@ type Spans = Vec<(u32, u32, u32)>;
 impl CocoMasks {
     /// Reads a file; masks are decoded photo by photo, later.
     ///
-    /// Where the file has a category `stone` beside others, only its annotations count.
+    /// Where annotations have several categories, those of the category `stone` or `stones` count. Crowds count as
+    /// stones: labelling programs write what is drawn with a brush as crowds.
     ///
     /// # Errors
-    /// The file cannot be read, is no COCO instances file or lists no image.
+    /// The file cannot be read, is no COCO instances file, lists no image, or has several categories none of which is
+    /// called stone.
     pub fn open(path: &Path) -> Result<Self, MaskError> {
-        let text = std::fs::read_to_string(path).map_err(|source| MaskError::Read {
-            path: path.to_owned(),
-            source,
-        })?;
+        let text = read_json_text(path)?;
         let raw: RawFile = serde_json::from_str(&text).map_err(|e| MaskError::Json {
             path: path.to_owned(),
             problem: e.to_string(),
@@ -117,24 +137,81 @@ impl CocoMasks {
             });
         }
 
-        let is_stone = |c: &&RawCategory| c.name.eq_ignore_ascii_case("stone");
-        let stones: BTreeSet<u64> = raw.categories.iter().filter(is_stone).map(|c| c.id).collect();
-        let mut annotations: BTreeMap<u64, Vec<RawAnnotation>> = BTreeMap::new();
+        let mut used: BTreeMap<String, usize> = BTreeMap::new();
+        for annotation in raw.annotations.iter().filter(|a| !a.category_id.is_null()) {
+            *used.entry(id(&annotation.category_id)).or_default() += 1;
+        }
+        let names: BTreeMap<String, &str> = raw
+            .categories
+            .iter()
+            .map(|c| (id(&c.id), c.name.trim()))
+            .collect();
+        let is_stone = |category: &String| {
+            let name = names.get(category).map(|name| name.to_lowercase());
+            matches!(name.as_deref(), Some("stone" | "stones"))
+        };
+        let count = |(category, n): (&String, &usize)| {
+            let name = names.get(category).copied().unwrap_or(category);
+            format!("{name:?} ({n})")
+        };
+        let knows_stones = names.keys().any(is_stone);
+        let others: BTreeMap<String, usize> = { used.iter() }
+            .filter(|(category, _)| !is_stone(category))
+            .map(|(category, n)| (category.clone(), *n))
+            .collect();
+        if !knows_stones && others.len() > 1 {
+            return Err(MaskError::Categories {
+                path: path.to_owned(),
+                found: others.iter().map(count).collect::<Vec<_>>().join(", "),
+            });
+        }
 
+        let mut remarks = Vec::new();
+        if knows_stones && !others.is_empty() {
+            let found: Vec<String> = others.iter().map(count).collect();
+            remarks.push(format!(
+                "not used: annotations of the categories {}",
+                found.join(", ")
+            ));
+        }
+        let listed: BTreeSet<String> = raw.images.iter().map(|image| id(&image.id)).collect();
+        let (mut crowds, mut lost) = (0, Vec::new());
+        let mut annotations: BTreeMap<String, Vec<RawAnnotation>> = BTreeMap::new();
         for annotation in raw.annotations {
-            if stones.is_empty() || annotation.category_id.is_none_or(|id| stones.contains(&id)) {
-                annotations
-                    .entry(annotation.image_id)
-                    .or_default()
-                    .push(annotation);
+            if knows_stones && others.contains_key(&id(&annotation.category_id)) {
+                continue;
             }
+            let image = id(&annotation.image_id);
+            if !listed.contains(&image) {
+                lost.push(id(&annotation.id));
+                continue;
+            }
+            crowds += usize::from(annotation.is_crowd());
+            annotations.entry(image).or_default().push(annotation);
+        }
+        if crowds > 0 {
+            remarks.push(format!(
+                "{crowds} annotations are marked as crowds (iscrowd): read as stones"
+            ));
+        }
+        if let Some(first) = lost.first() {
+            let n = lost.len();
+            remarks.push(format!(
+                "not used: {n} annotations of images that it does not list, first annotation {first}"
+            ));
         }
 
         Ok(Self {
             path: path.to_owned(),
             images: raw.images,
             annotations,
+            remarks,
         })
+    }
+
+    /// What of the file is not used, or not as it is marked, and why.
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
     }
 
     /// The photos that the file lists, in its order.
@@ -143,7 +220,7 @@ impl CocoMasks {
             file_name: &image.file_name,
             width: image.width,
             height: image.height,
-            masks: self.annotations.get(&image.id).map_or(0, Vec::len),
+            masks: self.annotations.get(&id(&image.id)).map_or(0, Vec::len),
         })
     }
 
@@ -151,8 +228,8 @@ impl CocoMasks {
     ///
     /// An instance's label is its place among the photo's annotations, from 1 on. Where masks overlap, the
     /// one of smaller area is on top (the later one if equal), so that a small stone inside the outline of a
-    /// large one survives. The polygons of one annotation are joined, as pycocotools does. Crowds and masks
-    /// without a visible pixel are left out with a warning.
+    /// large one survives. The polygons of one annotation are joined, as pycocotools does. Masks without a visible pixel
+    /// are left out with a warning.
     ///
     /// # Errors
     /// As [`super::MaskSource::labels_for`].
@@ -171,11 +248,11 @@ impl CocoMasks {
         for (index, annotation) in annotations.iter().enumerate() {
             let spans = self.spans(annotation, width, height)?;
             let area: u64 = spans.iter().map(|&(_, begin, end)| u64::from(end - begin)).sum();
-            let left_out = |why: &str| format!("annotation {} of photo {photo_name} {why}", annotation.id);
-            if annotation.iscrowd != 0 {
-                warnings.push(left_out("is a crowd, not a stone"));
-            } else if area == 0 {
-                warnings.push(left_out("covers no pixel of the photo"));
+            if area == 0 {
+                let id = id(&annotation.id);
+                warnings.push(format!(
+                    "annotation {id} of photo {photo_name} covers no pixel of the photo"
+                ));
             } else {
                 masks.push((area, index as u32 + 1, spans));
             }
@@ -197,17 +274,17 @@ impl CocoMasks {
         let mut instances = Vec::new();
 
         for (index, annotation) in annotations.iter().enumerate() {
-            let id = index as u32 + 1;
+            let label = index as u32 + 1;
             if is_visible[index + 1] {
                 instances.push(InstanceInfo {
-                    id,
-                    score: annotation.score.unwrap_or(1.0),
+                    id: label,
+                    score: annotation.score.as_f64().unwrap_or(1.0),
                     stone_ref: annotation.stone_id.as_u64().filter(|&stone| stone != 0),
                 });
-            } else if masks.iter().any(|mask| mask.1 == id) {
+            } else if masks.iter().any(|mask| mask.1 == label) {
                 warnings.push(format!(
                     "annotation {} of photo {photo_name} is hidden under smaller ones",
-                    annotation.id
+                    id(&annotation.id)
                 ));
             }
         }
@@ -236,7 +313,8 @@ impl CocoMasks {
         };
 
         let corners = |annotation: &RawAnnotation| {
-            let bounds = annotation.bbox.map(|[x, y, w, h]| [x, y, x + w, y + h]);
+            let sides = <[f64; 4]>::deserialize(&annotation.bbox).ok();
+            let bounds = sides.map(|[x, y, w, h]| [x, y, x + w, y + h]);
             let [width, height] = [width, height].map(f64::from);
             let shows = |[left, top, right, bottom]: &[f64; 4]| {
                 left < right
@@ -248,7 +326,7 @@ impl CocoMasks {
             };
             bounds.filter(shows).ok_or_else(|| MaskError::BadAnnotation {
                 path: self.path.clone(),
-                annotation: annotation.id,
+                annotation: id(&annotation.id),
                 problem: "no usable bbox: it must be [left, top, width, height] in pixels, within the photo"
                     .to_owned(),
             })
@@ -271,7 +349,7 @@ impl CocoMasks {
             return Ok(None);
         };
         MaskError::check_size(&self.path, photo_name, (image.width, image.height), size)?;
-        let annotations = self.annotations.get(&image.id);
+        let annotations = self.annotations.get(&id(&image.id));
         Ok(Some(annotations.map_or(&[][..], Vec::as_slice)))
     }
 
@@ -308,7 +386,7 @@ impl CocoMasks {
     fn spans(&self, annotation: &RawAnnotation, width: u32, height: u32) -> Result<Spans, MaskError> {
         let bad = |problem: String| MaskError::BadAnnotation {
             path: self.path.clone(),
-            annotation: annotation.id,
+            annotation: id(&annotation.id),
             problem,
         };
 
@@ -323,20 +401,29 @@ impl CocoMasks {
             }
         };
 
-        match &annotation.segmentation {
-            RawSegmentation::Polygons(polygons) => {
-                let mut spans = Spans::new();
-                for polygon in polygons {
-                    if polygon.len() % 2 != 0 || !polygon.iter().all(|v| v.is_finite()) {
-                        return Err(bad("a polygon must be pairs of numbers".to_owned()));
-                    }
-                    let ring = polygon.chunks_exact(2).map(|p| [p[0], p[1]]).collect();
-                    fill_polygon(&[ring], width, height, |y, begin, end| {
-                        spans.push((y, begin, end))
-                    });
+        let fill = |polygons: &[Vec<f64>]| {
+            let mut spans = Spans::new();
+            for polygon in polygons {
+                if polygon.len() % 2 != 0 || !polygon.iter().all(|v| v.is_finite()) {
+                    return Err(bad("a polygon must be pairs of numbers".to_owned()));
                 }
-                Ok(if polygons.len() > 1 { merged(spans) } else { spans })
+                let ring = polygon.chunks_exact(2).map(|p| [p[0], p[1]]).collect();
+                fill_polygon(&[ring], width, height, |y, begin, end| {
+                    spans.push((y, begin, end))
+                });
             }
+            Ok(if polygons.len() > 1 { merged(spans) } else { spans })
+        };
+
+        match &annotation.segmentation {
+            RawSegmentation::Polygons(polygons) => fill(polygons),
+            RawSegmentation::Polygon(polygon) => fill(std::slice::from_ref(polygon)),
+            RawSegmentation::Nothing(()) => Ok(Spans::new()),
+            RawSegmentation::Other(_) => Err(bad(
+                "its segmentation is neither a list of polygons [[x, y, x, y, ...]] nor runs {size, counts}: draw it again, or \
+                 take it out"
+                    .to_owned(),
+            )),
             RawSegmentation::Runs { size, counts } => {
                 let rle = Rle::from_counts(size[1], size[0], counts.clone());
                 runs(*size, rle.map_err(|e| bad(e.to_string()))?)

@@ -47,13 +47,21 @@ pub enum MaskError {
         /// What was expected there.
         expected: &'static str,
     },
+    /// Several categories, none of which is that of the stones.
+    #[error("its annotations have the categories {found}: call that of the stones \"stone\"; others are left out then: {}", path.display())]
+    Categories {
+        /// File.
+        path: PathBuf,
+        /// Their names, and how many annotations each has.
+        found: String,
+    },
     /// An annotation cannot be read.
     #[error("annotation {annotation}: {problem}: {}", path.display())]
     BadAnnotation {
         /// File.
         path: PathBuf,
         /// The annotation's id.
-        annotation: u64,
+        annotation: String,
         /// What is wrong with it.
         problem: String,
     },

@@ -10,13 +10,13 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
-use stonewise_core::raster::{LabelImage, Raster};
+use stonewise_core::raster::{LabelImage, Raster, connected_components};
 
 /// Bytes of pixels for each byte of a PNG, at most: deflate packs 258 bytes into two bits (RFC 1951, section
 /// 3.2.5).
 const MAX_PACKING: u64 = 1032;
 
-/// A folder of label images, each named after its photo: NAME.png, NAME_ids.png or NAME_mask.png.
+/// A folder of label images, each named after its photo: NAME.png, NAME_ids.png, NAME_mask.png or NAME.jpg.png.
 #[derive(Clone, Debug)]
 pub struct LabelFolder {
     folder: PathBuf,
@@ -59,15 +59,28 @@ impl LabelFolder {
         };
         let decoder = label_decoder(path)?;
         MaskError::check_size(path, photo_name, decoder.dimensions(), (width, height))?;
-        let labels = decode_labels(decoder, path)?;
-        let ids: BTreeSet<u32> = labels.data().iter().copied().filter(|&id| id != 0).collect();
+        let mut labels = decode_labels(decoder, path)?;
+        let ids = |labels: &LabelImage| -> BTreeSet<u32> {
+            labels.data().iter().copied().filter(|&id| id != 0).collect()
+        };
+        let mut instances = ids(&labels);
         let mut warnings = Vec::new();
 
-        if ids.len() == 1 && ids.contains(&255) {
-            warnings.push(format!(
-                "{} has one instance of value 255: stones need values of their own",
-                path.display()
-            ));
+        // 1, or white of 8 or 16 bits: stone or not, whichever stone it is.
+        if let Some(value) = instances
+            .first()
+            .filter(|id| instances.len() == 1 && [1, 255, 65535].contains(*id))
+        {
+            let (parts, found) = connected_components(&labels);
+            if found.len() > 1 || *value != 1 {
+                warnings.push(format!(
+                    "{} has one value for all stones, {value}: each part of it that hangs together is taken as a stone ({})",
+                    path.display(),
+                    found.len()
+                ));
+            }
+            instances = ids(&parts);
+            labels = parts;
         }
 
         let info = |id| InstanceInfo {
@@ -76,7 +89,7 @@ impl LabelFolder {
             stone_ref: None,
         };
         Ok(Some(LabelledPhoto {
-            instances: ids.into_iter().map(info).collect(),
+            instances: instances.into_iter().map(info).collect(),
             labels,
             warnings,
         }))
@@ -84,8 +97,12 @@ impl LabelFolder {
 
     fn find(&self, photo_name: &str) -> Result<Option<&PathBuf>, MaskError> {
         let wanted = PhotoName::new(photo_name);
-        let candidates =
-            ["", "_ids", "_mask"].map(|ending| wanted.with_file(format!("{}{ending}.png", wanted.stem())));
+        let named = ["", "_ids", "_mask"].map(|ending| format!("{}{ending}.png", wanted.stem()));
+        // That of one of two photos that differ in their extensions alone.
+        let whole = format!("{}.png", wanted.file());
+        let candidates: Vec<PhotoName> = { named.into_iter().chain([whole]) }
+            .map(|file| wanted.with_file(file))
+            .collect();
         let mut fitting: Vec<(usize, &PathBuf)> = Vec::new();
         for file in &self.files {
             let name = PhotoName::new(&file.strip_prefix(&self.folder).unwrap_or(file).to_string_lossy());

@@ -37,6 +37,14 @@ impl MaskSource {
         }
     }
 
+    /// What of the source is not used, or not as it is marked, whatever the photo.
+    pub fn remarks(&self) -> &[String] {
+        match self {
+            Self::Coco(coco) => coco.remarks(),
+            Self::Folder(_) => &[],
+        }
+    }
+
     /// The labels of a photo of this size; `None` where the source has nothing about it.
     ///
     /// `photo_name`: best with the folders it lies in, which tell apart photos of the same name; upper and

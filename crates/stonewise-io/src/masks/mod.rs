@@ -3,6 +3,7 @@
 mod coco;
 mod coco_write;
 mod error;
+mod json_text;
 mod label_png;
 mod labelled_photo;
 mod mask_source;

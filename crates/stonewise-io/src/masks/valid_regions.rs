@@ -1,6 +1,7 @@
 //! Where masks are complete.
 
 use super::MaskError;
+use super::json_text::read_json_text;
 use crate::photo_name::{Fit, PhotoName};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -38,10 +39,7 @@ impl ValidRegions {
     /// # Errors
     /// The file cannot be read or is something else.
     pub fn open(path: &Path) -> Result<Self, MaskError> {
-        let text = std::fs::read_to_string(path).map_err(|source| MaskError::Read {
-            path: path.to_owned(),
-            source,
-        })?;
+        let text = read_json_text(path)?;
         let photos = serde_json::from_str(&text).map_err(|e| MaskError::Regions {
             path: path.to_owned(),
             problem: e.to_string(),

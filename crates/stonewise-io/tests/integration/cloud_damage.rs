@@ -167,7 +167,7 @@ fn errors_name_the_file_the_line_and_the_reason() {
         (
             "a.csv",
             "x,y,z\nx,y,z\n",
-            "a.csv, line 2: not a point: expected numbers after the header",
+            "a.csv, line 2: not a point: \"x\" in column 1 is not a number",
         ),
         (
             "a.ply",

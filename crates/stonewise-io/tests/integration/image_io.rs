@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use stonewise_core::raster::{Raster, RgbImage};
 use stonewise_io::exif::read_exif;
-use stonewise_io::image_io::{image_size, picture_head, read_rgb, write_jpeg, write_png_rgb};
+use stonewise_io::image_io::{
+    image_size, photo_is_cut_off, picture_head, read_rgb, write_jpeg, write_png_rgb,
+};
 
 fn picture() -> RgbImage {
     let pixel = |i: u32| [(i % 40 * 6) as u8, (i / 40 * 8) as u8, 128];
@@ -32,6 +34,29 @@ fn the_content_decides_the_format() {
     let path = folder.path().join("really_a_png.jpg");
     write_png_rgb(&path, &picture()).unwrap();
     assert_eq!(read_rgb(&path).unwrap(), picture());
+}
+
+#[test]
+fn bytes_behind_the_end_of_a_jpeg_do_not_matter() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.jpg");
+    write_jpeg(&path, &picture(), 95).unwrap();
+    let (whole, expected) = (std::fs::read(&path).unwrap(), read_rgb(&path).unwrap());
+    for behind in [&[0xff, 0xda, 1, 2, 3][..], &[0; 9], &[0xff, 0xd8, 0xff, 0xd9]] {
+        std::fs::write(&path, [&whole, behind].concat()).unwrap();
+        assert_eq!(read_rgb(&path).unwrap(), expected, "{behind:?}");
+        assert!(!photo_is_cut_off(&path).unwrap());
+    }
+    // A preview of its own before the picture has an end, too; fill bytes may come before a marker.
+    let preview = [&[0xff, 0xff, 0xe1, 0, 2 + 4][..], &[0xff, 0xd8, 0xff, 0xd9]].concat();
+    let nested = [&whole[..2], &preview, &whole[2..]].concat();
+    std::fs::write(&path, &nested).unwrap();
+    assert_eq!(read_rgb(&path).unwrap(), expected);
+    for length in [nested.len() / 2, nested.len() - 2] {
+        std::fs::write(&path, &nested[..length]).unwrap();
+        assert!(read_rgb(&path).unwrap_err().to_string().contains("cut off"));
+        assert!(photo_is_cut_off(&path).unwrap());
+    }
 }
 
 fn testdata(name: &str) -> PathBuf {

@@ -10,6 +10,7 @@ mod camera_files;
 mod cameras;
 mod cloud_damage;
 mod cloud_formats;
+mod cloud_oddities;
 mod cloud_points;
 mod e57_photos;
 mod hostile_files;

@@ -71,7 +71,7 @@ fn masks_without_a_visible_pixel_are_named() {
         annotation(13, &[]),
         annotation(14, &[rectangle(2.0, 2.0, 3.0, 3.0)]),
         annotation(15, &[rectangle(2.0, 2.0, 3.0, 3.0)]),
-        json!({ "id": 16, "image_id": 1, "iscrowd": 1, "segmentation": { "size": [10, 20], "counts": [0, 200] } }),
+        json!({ "id": 16, "image_id": 1, "segmentation": null }),
         annotation(17, &[rectangle(-5.0, -5.0, 6.0, 6.0)]),
     ]))
     .unwrap();
@@ -82,7 +82,7 @@ fn masks_without_a_visible_pixel_are_named() {
         (11, "no pixel"),
         (12, "no pixel"),
         (13, "no pixel"),
-        (16, "crowd"),
+        (16, "no pixel"),
         (14, "hidden"),
     ];
     assert_eq!(photo.warnings.len(), expected.len(), "{:?}", photo.warnings);
@@ -174,6 +174,116 @@ fn broken_files_say_where() {
         .unwrap_err()
         .to_string();
     assert!(odd.contains("annotation 6: a polygon must be pairs"));
+    for odd in [
+        json!("polygon"),
+        json!([[1.0, "2"]]),
+        json!({ "size": [10, 20] }),
+        json!(7),
+    ] {
+        let annotation = json!({ "id": "a7", "image_id": 1, "segmentation": odd });
+        let said = labels(&coco(&[annotation])).unwrap_err().to_string();
+        assert!(
+            said.contains("annotation a7: its segmentation is neither"),
+            "{said}"
+        );
+    }
+}
+
+fn remarks(content: &Value) -> Vec<String> {
+    let folder = tempfile::tempdir().unwrap();
+    let source = MaskSource::open(&write(folder.path(), content)).unwrap();
+    source.remarks().to_vec()
+}
+
+#[test]
+fn values_that_other_programs_write_mean_the_same() {
+    let usual = coco(&[
+        annotation(1, &[rectangle(2.0, 2.0, 3.0, 3.0)]),
+        annotation(2, &[rectangle(9.0, 2.0, 3.0, 3.0)]),
+    ]);
+    let expected = labels(&usual).unwrap();
+    assert_eq!(expected.instances.len(), 2);
+    assert_eq!(remarks(&usual), [""; 0]);
+    let changed = |change: &dyn Fn(&mut Value)| {
+        let mut content = usual.clone();
+        for annotation in content["annotations"].as_array_mut().unwrap() {
+            change(annotation);
+        }
+        content
+    };
+    for content in [
+        changed(&|a| a["iscrowd"] = json!(false)),
+        changed(&|a| a["iscrowd"] = json!(null)),
+        changed(&|a| a["segmentation"] = a["segmentation"][0].clone()),
+        changed(&|a| a["image_id"] = json!("1")),
+        changed(&|a| a["id"] = json!(format!("a{}", a["id"]))),
+        changed(&|a| a["category_id"] = json!("1")),
+        changed(&|a| a["score"] = json!(null)),
+        changed(&|a| a["bbox"] = json!("none")),
+    ] {
+        assert_eq!(labels(&content).unwrap(), expected, "{content}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("masks.json");
+    std::fs::write(&path, format!("\u{feff}{usual}")).unwrap();
+    let source = MaskSource::open(&path).unwrap();
+    assert_eq!(source.labels_for("0001", 20, 10).unwrap(), Some(expected));
+}
+
+#[test]
+fn crowds_are_stones_and_said() {
+    let mut crowd = annotation(1, &[]);
+    // Column by column: rows 2 to 4 of column 3.
+    crowd["segmentation"] = json!({ "size": [10, 20], "counts": [32, 3, 165] });
+    crowd["iscrowd"] = json!(1);
+    let content = coco(&[crowd, annotation(2, &[rectangle(9.0, 2.0, 3.0, 3.0)])]);
+    let photo = labels(&content).unwrap();
+    assert_eq!((area(&photo, 1), area(&photo, 2)), (3, 9));
+    assert!(remarks(&content)[0].contains("1 annotations are marked as crowds"));
+}
+
+#[test]
+fn categories_are_told_apart_by_the_name_of_the_stones() {
+    let mut content = coco(&[
+        annotation(1, &[rectangle(2.0, 2.0, 3.0, 3.0)]),
+        annotation(2, &[rectangle(0.0, 0.0, 20.0, 10.0)]),
+    ]);
+    content["annotations"][1]["category_id"] = json!(2);
+    let named = |content: &Value, one: &str, other: &str| {
+        let mut content = content.clone();
+        content["categories"] = json!([{ "id": 1, "name": one }, { "id": 2, "name": other }]);
+        content
+    };
+    for (one, other) in [("stone", "joint"), ("Stones", "mortar")] {
+        let photo = labels(&named(&content, one, other)).unwrap();
+        assert_eq!((photo.instances.len(), area(&photo, 1)), (1, 9));
+        assert!(remarks(&named(&content, one, other))[0].contains(&format!("categories {other:?} (1)")));
+    }
+    let said = labels(&named(&content, "block", "joint"))
+        .unwrap_err()
+        .to_string();
+    assert!(said.contains("\"block\" (1), \"joint\" (1)"), "{said}");
+    // One category is that of the stones, whatever its name.
+    content["annotations"].as_array_mut().unwrap().pop();
+    assert_eq!(
+        labels(&named(&content, "block", "joint"))
+            .unwrap()
+            .instances
+            .len(),
+        1
+    );
+}
+
+#[test]
+fn annotations_of_other_images_are_counted() {
+    let mut content = coco(&[
+        annotation(1, &[rectangle(2.0, 2.0, 3.0, 3.0)]),
+        annotation(2, &[rectangle(9.0, 2.0, 3.0, 3.0)]),
+    ]);
+    content["annotations"][1]["image_id"] = json!(5);
+    assert!(
+        remarks(&content)[0].contains("1 annotations of images that it does not list, first annotation 2")
+    );
 }
 
 fn sample() -> LabelImage {
@@ -276,7 +386,16 @@ fn pngs_that_are_no_labels_are_refused() {
     let grey = image::GrayImage::from_raw(2, 2, vec![0, 255, 255, 0]).unwrap();
     grey.save(&path).unwrap();
     let source = MaskSource::open(folder.path()).unwrap();
+    // Stone or not: parts that touch at a corner alone are two stones.
     let photo = source.labels_for("a.jpg", 2, 2).unwrap().unwrap();
-    assert_eq!(photo.labels.data(), [0, 255, 255, 0]);
-    assert!(photo.warnings[0].contains("one instance"));
+    assert_eq!(photo.labels.data(), [0, 1, 2, 0]);
+    assert_eq!(photo.instances.iter().map(|i| i.id).collect::<Vec<_>>(), [1, 2]);
+    assert!(photo.warnings[0].contains("one value for all stones, 255") && photo.warnings[0].contains("(2)"));
+    let grey = image::GrayImage::from_raw(2, 2, vec![0, 7, 7, 0]).unwrap();
+    grey.save(&path).unwrap();
+    let photo = source.labels_for("a.jpg", 2, 2).unwrap().unwrap();
+    assert_eq!(
+        (photo.labels.data(), photo.warnings.len()),
+        (&[0, 7, 7, 0][..], 0)
+    );
 }

@@ -5,14 +5,16 @@ use super::sample::Sample;
 use crate::{Epoch, Project};
 use nalgebra::{Point3, Vector3};
 use stonewise_base::messages::findings::{
-    CENTIMETRES, CLOUDS, DEGREES, EXTENT, FEET, FIRST_EPOCH, INCHES, LITTLE_OVERLAP, MILLIMETRES, NO_OVERLAP,
-    NO_POINTS, OVERLAP, SAME_FILE, SPACING, SPACING_UNKNOWN, SPACING_VIEWS, SPACING_WIDE, SYSTEM,
-    SYSTEM_UNIT, SYSTEMS, THIS_EPOCH, TOO_LONG, TOO_SMALL, UNIT_RATIO, UNITS,
+    CENTIMETRES, CLOUDS, CONVERTED, DEGREES, EXTENT, FEET, FIRST_EPOCH, HEIGHTS_CONVERTED, INCHES,
+    LITTLE_OVERLAP, METRES, MILLIMETRES, NO_OVERLAP, NO_POINTS, OVERLAP, SAME_FILE, SIZED_FEET, SIZED_UNIT,
+    SPACING, SPACING_UNKNOWN, SPACING_VIEWS, SPACING_WIDE, SYSTEM, SYSTEM_UNIT, SYSTEMS, THIS_EPOCH,
+    TOO_LONG, TOO_SMALL, UNIT_RATIO, UNITS,
 };
+use stonewise_base::messages::notices::UNUSED_POINTS;
 use stonewise_base::messages::{Message, Said};
 use stonewise_base::settings::Align;
 use stonewise_core::geometry::Bounds;
-use stonewise_io::crs::{Crs, definition, is_in_feet};
+use stonewise_io::crs::{Crs, Units};
 
 /// Metres in a unit that somebody may have exported, by its name.
 static UNIT_NAMES: [(&Message, f64); 4] = [
@@ -41,6 +43,7 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
         found.push(extent(&epoch.name, survey));
         found.push(spacing(epoch, survey));
         found.extend(unit_of_system(&epoch.name, survey));
+        found.extend(odd(&epoch.name, survey));
     }
     if surveys.iter().any(Option::is_some) {
         found.push(systems(project, surveys));
@@ -118,56 +121,105 @@ fn spacing(epoch: &Epoch, survey: &Sample) -> Finding {
     Finding::new(&epoch.name, &SPACING, verdict, text)
 }
 
-/// A coordinate system whose unit is not the metre.
+/// What the readers say of an epoch's files.
+fn odd(name: &str, survey: &Sample) -> Vec<Finding> {
+    let remarks = survey.remarks.iter().map(|(file, remark)| {
+        let verdict = if remark.is_doubt {
+            Verdict::Doubt
+        } else {
+            Verdict::Note
+        };
+        Finding::new(name, &CLOUDS, verdict, format!("{file}: {}", remark.text))
+    });
+    let unused = (survey.unused > 0).then(|| {
+        let counts = [survey.unused, survey.passed].map(|n| n.to_string());
+        let text = UNUSED_POINTS.say(&[("n", (&*counts[0]).into()), ("all", (&*counts[1]).into())]);
+        Finding::new(name, &CLOUDS, Verdict::Note, text)
+    });
+    remarks.chain(unused).collect()
+}
+
+/// Coordinates in units other than metres: those of the file are converted, those of a system that the points are not in
+/// cannot be right.
 fn unit_of_system(name: &str, survey: &Sample) -> Option<Finding> {
-    let unit = |text: &String| {
-        let code = Crs::parse(text).and_then(|crs| u32::try_from(crs.epsg).ok());
-        // A code stands for its definition, where that is known.
-        let known = text.strip_prefix("EPSG:").and_then(definition);
-        let text = known.unwrap_or_else(|| text.clone()).to_ascii_lowercase();
-        let has = |keywords: [&str; 3]| keywords.iter().any(|keyword| text.contains(keyword));
-        let is_geographic =
-            has(["geogcs", "geogcrs", "geodcrs"]) && !has(["projcs", "projcrs", "projectedcrs"]);
-        let feet = [
-            "unit[\"foot",
-            "unit[\"us survey foot",
-            "unit[\"foot_us",
-            "unit[\"international foot",
-        ];
-        match () {
-            () if is_geographic => Some(&DEGREES),
-            () if code.is_some_and(is_in_feet) || feet.iter().any(|f| text.contains(f)) => Some(&FEET),
-            () => None,
-        }
+    let wrong = |unit: Said| Finding::new(name, &UNITS, Verdict::Wrong, SYSTEM_UNIT.say(&[("unit", unit)]));
+    let read = || {
+        survey
+            .crs
+            .iter()
+            .flatten()
+            .filter_map(|text| Units::of(text).ok())
     };
-    let unit: &Message = survey.crs.iter().flatten().filter_map(unit).next()?;
-    let text = SYSTEM_UNIT.say(&[("unit", unit.into())]);
-    Some(Finding::new(name, &UNITS, Verdict::Wrong, text))
+    if read()
+        .chain(survey.units.iter().copied())
+        .any(|units| units.is_geographic)
+    {
+        return Some(wrong((&DEGREES).into()));
+    }
+    // E57 says metres, whatever its system says.
+    if let Some(units) = read().find(|units| !units.are_metres()) {
+        let size_m = if units.plane_m == 1.0 {
+            units.height_m
+        } else {
+            units.plane_m
+        };
+        return Some(wrong(unit(size_m)));
+    }
+    let Units {
+        plane_m, height_m, ..
+    } = survey.units.iter().find(|units| !units.are_metres())?;
+    let text = match plane_m == height_m {
+        true => CONVERTED.say(&[("unit", unit(*plane_m))]),
+        false => HEIGHTS_CONVERTED.say(&[("plane", unit(*plane_m)), ("height", unit(*height_m))]),
+    };
+    Some(Finding::new(name, &UNITS, Verdict::Note, text))
+}
+
+/// A unit by its size.
+fn unit(size_m: f64) -> Said {
+    let size = [("m", Said::numbers(size_m.to_string()))];
+    match () {
+        () if size_m == 1.0 => (&METRES).into(),
+        // International, US survey, and those of older maps.
+        () if (size_m - 0.3048).abs() < 1e-5 => SIZED_FEET.say(&size),
+        () => SIZED_UNIT.say(&size),
+    }
 }
 
 /// One system for all clouds.
 fn systems(project: &Project, surveys: &[Option<Sample>]) -> Finding {
     let mut codes: Vec<(i32, &str)> = Vec::new();
-    let (mut named, mut all) = (0, 0);
+    let mut own = None;
+    let (mut coded, mut all) = (0, 0);
     for (epoch, survey) in read(project, surveys) {
         for crs in &survey.crs {
             all += 1;
-            if let Some(crs) = crs.as_deref().and_then(Crs::parse) {
-                named += 1;
-                if !codes.iter().any(|(code, _)| *code == crs.epsg) {
-                    codes.push((crs.epsg, &epoch.name));
-                }
+            let Some(crs) = crs.as_deref().and_then(Crs::parse) else {
+                continue;
+            };
+            let Some(code) = crs.epsg else {
+                own.get_or_insert(crs.name);
+                continue;
+            };
+            coded += 1;
+            if !codes.iter().any(|(known, _)| *known == code) {
+                codes.push((code, &epoch.name));
             }
         }
     }
 
     let topic = &SYSTEM;
     match codes.as_slice() {
-        [] => Finding::new("", topic, Verdict::Fine, "none named: a local frame"),
-        [(code, _)] if named == all => Finding::new("", topic, Verdict::Fine, format!("EPSG:{code}")),
+        [] => {
+            let text = own.map_or("none named: a local frame".to_owned(), |name| {
+                format!("{name}, without a code")
+            });
+            Finding::new("", topic, Verdict::Fine, text)
+        }
+        [(code, _)] if coded == all => Finding::new("", topic, Verdict::Fine, format!("EPSG:{code}")),
         [(code, _)] => {
             let text =
-                format!("EPSG:{code} in {named} of {all} clouds, the others name none; taken as the same");
+                format!("EPSG:{code} in {coded} of {all} clouds, the others name no code; taken as the same");
             Finding::new("", topic, Verdict::Note, text)
         }
         several => {

@@ -1,4 +1,4 @@
-//! Can the masks be read, and are there some for every photo?
+//! Can the masks be read, are there some for every photo, and how many of them will be used?
 
 use super::finding::{Finding, Verdict};
 use super::photos::{PosedPhoto, some};
@@ -6,13 +6,16 @@ use crate::Epoch;
 use rayon::prelude::*;
 use stonewise_base::error::{Error, Result};
 use stonewise_base::messages::Said;
-use stonewise_base::messages::findings::{BROKEN_MASKS, MASKS, NO_MASK_FITS, WITHOUT_MASKS};
+use stonewise_base::messages::findings::{
+    BROKEN_MASKS, MASKS, NO_MASK_FITS, NO_MASK_USABLE, ONE_MASK_EACH, WITHOUT_MASKS,
+};
 use stonewise_core::progress::Progress;
 use stonewise_io::masks::MaskSource;
 
 /// What a photo's masks are like.
 enum Masks {
-    There,
+    /// How many will be used, and what is said of the others.
+    There(usize, Vec<String>),
     Missing(String),
     /// Photo, and why they cannot be used.
     Broken(String, String),
@@ -37,7 +40,7 @@ pub(super) fn look(epoch: &Epoch, photos: &[PosedPhoto], progress: &dyn Progress
         progress.check()?;
         let size = (view.camera.width, view.camera.height);
         let masks = match source.labels_for(&path.to_string_lossy(), size.0, size.1) {
-            Ok(Some(_)) => Masks::There,
+            Ok(Some(labelled)) => Masks::There(labelled.instances.len(), labelled.warnings),
             Ok(None) => Masks::Missing(view.name.clone()),
             Err(error) => Masks::Broken(view.name.clone(), error.to_string()),
         };
@@ -48,16 +51,20 @@ pub(super) fn look(epoch: &Epoch, photos: &[PosedPhoto], progress: &dyn Progress
     let file = file.to_string_lossy();
     let finding = |verdict, text: Said| Finding::new(&epoch.name, &MASKS, verdict, text);
     let (mut found, mut missing, mut broken) = (Vec::new(), Vec::new(), Vec::new());
-    let mut there = 0;
+    let (mut counts, mut warnings) = (Vec::new(), Vec::new());
 
     for masks in masks {
         match masks {
-            Masks::There => there += 1,
+            Masks::There(count, said) => {
+                counts.push(count);
+                warnings.extend(said);
+            }
             Masks::Missing(photo) => missing.push(photo),
             Masks::Broken(photo, reason) => broken.push((photo, reason)),
         }
     }
 
+    let (there, used) = (counts.len(), counts.iter().sum::<usize>());
     if there == 0 && broken.is_empty() {
         let text = NO_MASK_FITS.say(&[("file", (&*file).into())]);
         return Ok(vec![finding(Verdict::Unreadable, text)]);
@@ -78,11 +85,29 @@ pub(super) fn look(epoch: &Epoch, photos: &[PosedPhoto], progress: &dyn Progress
         found.push(finding(Verdict::Doubt, text));
     }
 
-    if found.is_empty() {
+    if there > 0 && used == 0 {
         found.push(finding(
-            Verdict::Fine,
-            format!("there for every photo ({there})").into(),
+            Verdict::Wrong,
+            NO_MASK_USABLE.say(&[("file", (&*file).into())]),
         ));
+    } else if there > 1 && counts.iter().all(|count| *count <= 1) {
+        found.push(finding(
+            Verdict::Doubt,
+            ONE_MASK_EACH.say(&[("file", (&*file).into())]),
+        ));
+    }
+    if found.is_empty() {
+        let text = format!("there for every photo ({there}): {used} masks");
+        found.push(finding(Verdict::Fine, text.into()));
+    }
+    found.extend(
+        source
+            .remarks()
+            .iter()
+            .map(|remark| finding(Verdict::Note, remark.as_str().into())),
+    );
+    if !warnings.is_empty() {
+        found.push(finding(Verdict::Note, some(&warnings).into()));
     }
 
     Ok(found)

@@ -2,18 +2,14 @@
 
 use super::finding::{Finding, Verdict};
 use crate::{Epoch, PhotoFiles, Project};
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
-use stonewise_base::error::{Error, Result};
+use std::path::PathBuf;
+use stonewise_base::error::Result;
 use stonewise_base::messages::Said;
 use stonewise_base::messages::findings::{BROKEN_PHOTOS, MISSING_PHOTOS, NO_PHOTOS, PHOTO_SIZES, PHOTOS};
 use stonewise_core::geometry::View;
 use stonewise_io::cameras::{CameraFile, Photos, find_photos};
-use stonewise_io::image_io::image_size;
+use stonewise_io::image_io::{image_size, photo_is_cut_off};
 
-/// Bytes at the end of a JPEG among which its end marker must be; some cameras append previews.
-const TAIL: u64 = 64 << 10;
 /// Names in a message at most.
 const NAMES: usize = 4;
 
@@ -44,7 +40,7 @@ pub(super) fn look<'a>(
             .into_owned();
         match image_size(path) {
             Err(_) => broken.push(name),
-            Ok(_) if is_cut_off(path)? => broken.push(name),
+            Ok(_) if photo_is_cut_off(path)? => broken.push(name),
             Ok((width, height)) if (width, height) != (view.camera.width, view.camera.height) => {
                 sizes.push(format!(
                     "{name} {width}x{height} px (camera {}x{} px)",
@@ -163,20 +159,4 @@ pub(super) fn some(all: &[String]) -> String {
         0 => first,
         more => format!("{first} (+ {more})"),
     }
-}
-
-/// Whether a JPEG's end marker is missing; decoders paint what is not there grey without a word.
-fn is_cut_off(path: &Path) -> Result<bool> {
-    let failed = || Error::io("reading", path);
-    let mut file = File::open(path).map_err(failed())?;
-    let mut start = [0; 2];
-    if file.read_exact(&mut start).is_err() || start != [0xff, 0xd8] {
-        return Ok(false);
-    }
-    let length = file.seek(SeekFrom::End(0)).map_err(failed())?;
-    file.seek(SeekFrom::Start(length.saturating_sub(TAIL)))
-        .map_err(failed())?;
-    let mut tail = Vec::new();
-    file.read_to_end(&mut tail).map_err(failed())?;
-    Ok(!tail.windows(2).any(|pair| pair == [0xff, 0xd9]))
 }

@@ -9,7 +9,8 @@ use std::path::Path;
 use stonewise_base::error::Result;
 use stonewise_base::messages::findings::CLOUDS;
 use stonewise_core::geometry::{Bounds, cell_of};
-use stonewise_io::cloud::{CloudError, cloud_info, read_cloud};
+use stonewise_io::cloud::{CloudError, Remark, cloud_info, read_cloud};
+use stonewise_io::crs::Units;
 
 /// Points of an epoch that are looked at, quickly and fully.
 const POINTS: [u64; 2] = [500_000, 6_000_000];
@@ -19,23 +20,32 @@ const CHUNK: usize = 250_000;
 const CELL_M: f64 = 0.05;
 
 /// What is known of an epoch's clouds.
+#[derive(Default)]
 pub(super) struct Sample {
     /// Box around all points.
     pub bounds: Option<Bounds>,
-    /// Number of points.
+    /// Number of records.
     pub records: u64,
+    /// Records that were looked at.
+    pub passed: u64,
+    /// Withheld points and noise among these.
+    pub unused: u64,
     /// The first points of each cloud.
     pub points: Vec<Point3<f64>>,
     /// Distance between neighbours on the surface, metres.
     pub spacing_m: Option<f64>,
     /// Coordinate systems, as the clouds name them; `None` where one names none.
     pub crs: Vec<Option<String>>,
+    /// Units of the coordinates in each file.
+    pub units: Vec<Units>,
+    /// What is odd about a file, with its name.
+    pub remarks: Vec<(String, Remark)>,
 }
 
 impl Sample {
-    /// Whether every point was read.
+    /// Whether every record was looked at.
     pub fn is_whole(&self) -> bool {
-        self.points.len() as u64 >= self.records
+        self.passed >= self.records
     }
 
     /// Adds a cloud and the first `left` of its points.
@@ -43,17 +53,29 @@ impl Sample {
         let info = cloud_info(path)?;
         self.records += info.records;
         self.crs.push(info.crs);
+        self.units.push(info.units);
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        self.remarks
+            .extend(info.remarks.into_iter().map(|remark| (name.to_string(), remark)));
         if let Some(bounds) = info.bounds {
             self.bounds = Some(self.bounds.map_or(bounds, |b| b.union(&bounds)));
         }
+        let before = self.passed;
         let read = read_cloud(path, CHUNK, |chunk| {
+            let last = chunk.indices.last().map_or(0, |index| index + 1);
+            self.passed = self.passed.max(before + last);
+            self.unused += chunk.unused;
             let taken = left.min(chunk.positions.len());
             self.points.extend_from_slice(&chunk.positions[..taken]);
             left -= taken;
             if left == 0 { Err(Stop::Enough) } else { Ok(()) }
         });
         match read {
-            Ok(_) | Err(Stop::Enough) => Ok(()),
+            Ok(summary) => {
+                self.passed = before + summary.records;
+                Ok(())
+            }
+            Err(Stop::Enough) => Ok(()),
             Err(Stop::Failed(error)) => Err(error.into()),
         }
     }
@@ -64,13 +86,7 @@ impl Sample {
 /// # Errors
 /// At quick depth, a cloud cannot be read.
 pub(super) fn sample(epoch: &Epoch, depth: Depth, unreadable: &mut Unreadable) -> Result<Option<Sample>> {
-    let mut sample = Sample {
-        bounds: None,
-        records: 0,
-        points: Vec::new(),
-        spacing_m: None,
-        crs: Vec::new(),
-    };
+    let mut sample = Sample::default();
     let points = POINTS[usize::from(depth == Depth::Full)];
     let share = points / epoch.clouds.len().max(1) as u64;
     let mut is_whole = true;

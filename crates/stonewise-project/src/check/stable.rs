@@ -45,9 +45,9 @@ mod tests {
         let survey = |records| Sample {
             bounds: Bounds::of(points.iter().copied()),
             records,
+            passed: points.len() as u64,
             points: points.clone(),
-            spacing_m: None,
-            crs: Vec::new(),
+            ..Sample::default()
         };
         let area = |from: f64, to: f64| -> StableArea {
             toml::from_str(&format!("corners = [[{from}, -1.0, -1.0], [{to}, 1.0, 1.0]]")).unwrap()

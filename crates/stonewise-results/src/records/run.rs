@@ -64,8 +64,8 @@ pub struct ProjectRecord {
 /// A coordinate system.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrsRecord {
-    /// Code of the EPSG.
-    pub epsg: i32,
+    /// Code of the EPSG; absent for a system that has none, as one that was restated in metres.
+    pub epsg: Option<i32>,
     /// Name.
     pub name: String,
     /// Definition as WKT; empty where the clouds have none.

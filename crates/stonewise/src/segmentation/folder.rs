@@ -76,7 +76,8 @@ pub struct PhotoScore {
 /// Finds the stones of all photos of a folder, or outlines those in given boxes, and writes, in `out`:
 ///
 /// - `labels/NAME.png`: stone of every pixel, 16 bits,
-/// - `overlays/NAME.jpg`: the photo with the outlines of its stones,
+/// - `overlays/NAME.jpg`: the photo with the outlines of its stones; of photos that differ in their extensions alone, the
+///   names of both keep them (`NAME.tif.png`),
 /// - `masks.json`: all masks as a COCO instances file,
 /// - `evaluation.json`: figures, where there is a reference.
 ///
@@ -113,7 +114,9 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
         progress.check()?;
         progress.detail(&format!("photo {number} of {}", photos.len()));
         let name = photo.strip_prefix(&root).unwrap_or(photo);
-        let labels = file_in(&job.out.join("labels"), name, "png")?;
+        let is_same = |other: &&PathBuf| other.with_extension("") == photo.with_extension("");
+        let is_shared = photos.iter().filter(is_same).count() > 1;
+        let labels = file_in(&job.out.join("labels"), name, "png", is_shared)?;
         let key = Key::new(
             STEP,
             &(job.tiling, &boxes_digest),
@@ -135,7 +138,7 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
                         outline_boxes(&detector, &image, None, &of_photo, job.tiling, progress)?
                     }
                 };
-                let overlay = file_in(&job.out.join("overlays"), name, "jpg")?;
+                let overlay = file_in(&job.out.join("overlays"), name, "jpg", is_shared)?;
                 write_jpeg(&overlay, &outlined(&image, &segmented.labels), JPEG_QUALITY)?;
                 write_label_png(&labels, &segmented.labels)?;
                 write_json(&step.file(SCORES), &segmented.scores)
@@ -196,9 +199,14 @@ fn photos_of(path: &Path) -> Result<(PathBuf, Vec<PathBuf>)> {
     Ok((path.to_path_buf(), photos))
 }
 
-/// A file named after a photo; makes the folders on the way.
-fn file_in(folder: &Path, name: &Path, extension: &str) -> Result<PathBuf> {
-    let path = folder.join(name).with_extension(extension);
+/// A file named after a photo, without the photo's extension unless another photo has the same name but for that
+/// (`is_shared`); makes the folders on the way.
+fn file_in(folder: &Path, name: &Path, extension: &str, is_shared: bool) -> Result<PathBuf> {
+    let mut path = folder.join(name);
+    match is_shared {
+        true => path.add_extension(extension),
+        false => path.set_extension(extension),
+    };
     let parent = path.parent().unwrap_or(folder);
     fs::create_dir_all(parent).map_err(Error::io("making a folder", parent))?;
     Ok(path)

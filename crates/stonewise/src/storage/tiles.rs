@@ -21,7 +21,7 @@ use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::geometry::{Bounds, Rigid3, cell_of};
 use stonewise_core::progress::Progress;
 use stonewise_core::views::PointValues;
-use stonewise_io::cloud::{PointChunk, claimed_records, read_cloud};
+use stonewise_io::cloud::{PointChunk, ReadSummary, claimed_records, read_cloud};
 use stonewise_io::table::{Table, read_columns, write_parquet};
 
 /// File of the epoch's sources.
@@ -236,8 +236,8 @@ impl Keeps {
 
 /// Cuts clouds into tiles in one streaming pass; points of a tile keep the order of files and records.
 ///
-/// `size_m`: edge of a tile, metres. Points that do not take part are in no tile. Returns the number of
-/// records without finite coordinates, which no tile holds.
+/// `size_m`: edge of a tile, metres. Points that do not take part are in no tile. Returns how many records there are, and
+/// how many of them no tile holds because they have no finite coordinates, are withheld or noise.
 pub fn cut_into_tiles(
     clouds: &[PathBuf],
     rule: SourceRule,
@@ -245,11 +245,11 @@ pub fn cut_into_tiles(
     (keeps, takes_part): (Keeps, impl Fn(&Point3<f64>) -> bool + Sync),
     step: &StepDir,
     progress: &dyn Progress,
-) -> Result<u64> {
+) -> Result<ReadSummary> {
     let mut spill = Spill::new(&step.file("spill"), |k: &[i64; 3]| {
         format!("t_{}_{}_{}", k[0], k[1], k[2])
     })?;
-    let mut invalid = 0;
+    let mut summary = ReadSummary::default();
     let mut sources = SourceList::new(rule);
     let records = clouds
         .iter()
@@ -260,7 +260,7 @@ pub fn cut_into_tiles(
     for (file, (path, &records)) in clouds.iter().zip(&records).enumerate() {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         progress.begin(&format!("ingest {name}"), records);
-        let summary = read_cloud(path, CHUNK, |chunk| {
+        summary += read_cloud(path, CHUNK, |chunk| {
             progress.check()?;
             let origins = sources.of_chunk(file, chunk);
             for run in tile_runs(chunk, &origins, file as u32, size_m, (keeps, &takes_part)) {
@@ -271,7 +271,6 @@ pub fn cut_into_tiles(
             progress.advance(chunk.len() as u64);
             Ok::<(), Error>(())
         })?;
-        invalid += summary.skipped;
     }
 
     let bins = spill.finish()?;
@@ -293,7 +292,7 @@ pub fn cut_into_tiles(
 
     write_json(&step.file(SOURCES), &sources.finish())?;
     write_json(&step.file("tiles.json"), &entries)?;
-    Ok(invalid)
+    Ok(summary)
 }
 
 /// Consecutive points of a file that lie in one tile.

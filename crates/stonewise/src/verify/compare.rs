@@ -227,14 +227,23 @@ fn first_of_cells(
     let value = |cell: &str| serde_json::from_str(cell).unwrap_or_else(|_| Value::from(cell));
     let object = |row: &CsvRow<'_>| {
         let cells = a.head().iter().enumerate();
-        Value::Object(cells.map(|(i, name)| (name.to_string(), value(row.text(i)))).collect())
+        Value::Object(
+            cells
+                .map(|(i, name)| (name.to_string(), value(row.text(i))))
+                .collect(),
+        )
     };
     let (mut of_a, mut of_b) = (a.rows(), b.rows());
     for line in 2.. {
         let difference = match (of_a.next().transpose()?, of_b.next().transpose()?) {
-            (Some(x), Some(y)) => {
-                different_at(&format!("line {line}"), "", 0.0, &object(&x), &object(&y), tolerance)
-            }
+            (Some(x), Some(y)) => different_at(
+                &format!("line {line}"),
+                "",
+                0.0,
+                &object(&x),
+                &object(&y),
+                tolerance,
+            ),
             (None, None) => break,
             _ => Some(format!("{} and {} rows", a.rows().count(), b.rows().count())),
         };

@@ -84,6 +84,27 @@ fn masks_come_back_as_written_and_score_fully_against_themselves() {
 }
 
 #[test]
+fn photos_of_one_stem_keep_files_of_their_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let (photos, weights) = input(dir.path());
+    write_png_rgb(&photos.join("a/one.tif"), masonry_photo(5, 150, 110).image()).unwrap();
+    let out = dir.path().join("out");
+    assert_eq!(segment(&photos, &out, &weights, None).photos, 3);
+    for name in ["a/one.png", "a/one.tif", "b/two"] {
+        assert!(out.join(format!("overlays/{name}.jpg")).exists(), "{name}");
+    }
+    let labels = MaskSource::open(&out.join("labels")).unwrap();
+    let coco = MaskSource::open(&out.join("masks.json")).unwrap();
+    for name in ["a/one.png", "a/one.tif", "b/two.png"] {
+        let is_stone = |source: &MaskSource| {
+            let photo = source.labels_for(name, 150, 110).unwrap().unwrap();
+            photo.labels.data().iter().map(|l| *l != 0).collect::<Vec<_>>()
+        };
+        assert_eq!(is_stone(&labels), is_stone(&coco), "{name}");
+    }
+}
+
+#[test]
 fn photos_that_are_done_are_not_done_again_unless_the_detector_is_another() {
     let dir = tempfile::tempdir().unwrap();
     let (photos, weights) = input(dir.path());

@@ -10,7 +10,7 @@ use stonewise::results::calendar::date_of_gps;
 use stonewise_core::geometry::Bounds;
 use stonewise_io::cameras::{E57ImageCounts, count_e57_images};
 use stonewise_io::cloud::{Clock, CloudDetails, CloudFormat, Created, Rounding, SourcePoints, cloud_details};
-use stonewise_io::crs::Crs;
+use stonewise_io::crs::{Crs, UnitName, Units};
 
 /// Difference of a header's box from that of the points from which on the header is wrong, metres: above all
 /// roundings.
@@ -75,6 +75,18 @@ fn text(details: &CloudDetails) -> String {
     };
     if details.summary.skipped > 0 {
         line(format!("{} of them have no position", details.summary.skipped));
+    }
+    if details.summary.unused > 0 {
+        line(format!(
+            "{} of them are withheld or noise (classes 7 and 18), and are not used",
+            details.summary.unused
+        ));
+    }
+    for remark in &details.remarks {
+        line(remark.text.clone());
+    }
+    if let Some(units) = units(&details.units) {
+        line(units);
     }
     if let Some(bounds) = &details.bounds {
         line(extent(bounds));
@@ -166,10 +178,14 @@ fn json(details: &CloudDetails) -> serde_json::Value {
     json!({
         "kind": "cloud",
         "format": details.format,
-        "records": details.summary.records,
+        "points": details.summary.records,
         "without_position": details.summary.skipped,
-        "bounds_m": details.bounds.as_ref().map(corners),
-        "wrong_header_bounds_m": wrong_box(details).as_ref().map(corners),
+        "not_used": details.summary.unused,
+        "bounds": details.bounds.as_ref().map(corners),
+        "unit_m": details.units.plane_m,
+        "height_unit_m": details.units.height_m,
+        "remarks": details.remarks.iter().map(|r| &r.text).collect::<Vec<_>>(),
+        "wrong_header_bounds": wrong_box(details).as_ref().map(corners),
         "rounding": match details.rounding {
             Rounding::Scaled { scale, offset } => json!({ "scale_m": scale, "offset_m": offset }),
             Rounding::Decimals(n) => json!({ "decimals": n }),
@@ -184,8 +200,23 @@ fn json(details: &CloudDetails) -> serde_json::Value {
         "written": written(details),
         "software": details.software,
         "crs": details.crs,
-        "epsg": named.map(|crs| crs.epsg),
+        "epsg": named.and_then(|crs| crs.epsg),
     })
+}
+
+/// Units other than metres.
+fn units(units: &Units) -> Option<String> {
+    let [plane, height] = [units.plane_m, units.height_m].map(UnitName);
+    match units {
+        units if units.are_metres() => None,
+        units if units.is_geographic => Some(format!("degrees, with heights in {height}")),
+        units if units.plane_m == units.height_m => {
+            Some(format!("coordinates in {plane}, given here in metres"))
+        }
+        _ => Some(format!(
+            "eastings and northings in {plane}, heights in {height}, given here in metres"
+        )),
+    }
 }
 
 /// When the file was written.
@@ -198,6 +229,10 @@ fn written(details: &CloudDetails) -> Option<String> {
 
 fn wrong_box(details: &CloudDetails) -> Option<Bounds> {
     let (claimed, found) = (details.claimed_bounds?, details.bounds?);
+    // The header's box is that of all records.
+    if details.summary.unused > 0 {
+        return None;
+    }
     let error = (claimed.min - found.min)
         .amax()
         .max((claimed.max - found.max).amax());
@@ -253,7 +288,10 @@ fn period(clock: Clock, times: [f64; 2]) -> Option<String> {
 fn system(text: &str) -> String {
     match Crs::parse(text) {
         Some(crs) if crs.wkt.is_empty() => text.to_owned(),
-        Some(crs) => format!("{} (EPSG:{})", crs.name, crs.epsg),
+        Some(crs) => match crs.epsg {
+            Some(code) => format!("{} (EPSG:{code})", crs.name),
+            None => format!("{}, without a code", crs.name),
+        },
         None => text.to_owned(),
     }
 }

@@ -148,6 +148,7 @@ fn cameras(path: &Path) -> Result<Described> {
 /// Cameras bear a name of theirs, or are a list; masks are an object.
 fn json_file(path: &Path) -> Result<Described> {
     let text = std::fs::read(path).unwrap_or_default();
+    let text = text.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&text);
     let first = text.iter().find(|byte| !byte.is_ascii_whitespace());
     if is_camera_file(path) || unread_cameras(path).is_some() || first != Some(&b'{') {
         return cameras(path);
@@ -155,6 +156,9 @@ fn json_file(path: &Path) -> Result<Described> {
     let masks = CocoMasks::open(path)?;
     let mut text = format!("  masks (COCO) of {}\n", counted(masks.photos().count(), "photo"));
     let mut photos = Vec::new();
+    for remark in masks.remarks() {
+        text += &format!("  {remark}\n");
+    }
     for photo in masks.photos() {
         text += &format!(
             "  {}: {} x {} px, {}\n",
@@ -169,6 +173,6 @@ fn json_file(path: &Path) -> Result<Described> {
     }
     Ok(Described {
         text,
-        json: json!({ "kind": "masks", "photos": photos }),
+        json: json!({ "kind": "masks", "photos": photos, "remarks": masks.remarks() }),
     })
 }

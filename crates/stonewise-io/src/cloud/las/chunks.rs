@@ -50,12 +50,12 @@ pub struct Chunk {
 
 impl Chunks {
     /// Checks that the chunks and their layers lie inside the file and hold the points that the header
-    /// claims.
-    pub fn check(file: &Envelope, compression: &Compression) -> Result<Self, CloudError> {
+    /// claims; also gives the number of points that they hold at least.
+    pub fn check(file: &Envelope, compression: &Compression) -> Result<(Self, u64), CloudError> {
         let (points, path) = (file.points(), &file.path);
         if points == 0 {
             // The chunks must not be read, whatever their table says.
-            return Ok(Self::Known(Vec::new()));
+            return Ok((Self::Known(Vec::new()), 0));
         }
         let bytes = file.length - file.start();
         if points / MAX_POINTS_PER_BYTE > bytes {
@@ -64,28 +64,37 @@ impl Chunks {
         }
         if compression.order == Order::Stream {
             let start = file.start();
-            return Ok(Self::Unknown { start, points });
+            return Ok((Self::Unknown { start, points }, points));
         }
         let vlr = &compression.vlr;
-        let Some(place) = table_place(file)? else {
+        let table = table_place(file)?.map(|place| read_table(file, vlr, place));
+        // A table without chunks is that of a writer that has not come to it.
+        let Some(chunks) = table.transpose()?.filter(|chunks| !chunks.is_empty()) else {
+            let unknown = || Self::Unknown {
+                start: first_chunk(file),
+                points: u64::from(vlr.chunk_size()),
+            };
             return match compression.order {
-                Order::Layers => walk_layers(file, vlr).map(|chunks| Self::of(file, chunks)),
+                Order::Layers => walk_layers(file, vlr).map(|chunks| (Self::of(file, chunks), points)),
                 _ if vlr.uses_variable_size_chunks() => Err(CloudError::malformed(
                     path,
                     "the table of its chunks is missing: write the file again",
                 )),
-                _ => Ok(Self::Unknown {
-                    start: first_chunk(file),
-                    points: u64::from(vlr.chunk_size()),
-                }),
+                _ => Ok((unknown(), points)),
             };
         };
-        let chunks = read_table(file, vlr, place)?;
         check_table(file, vlr, &chunks)?;
-        if compression.order == Order::Layers {
-            check_layers(file, vlr, &chunks)?;
-        }
-        Ok(Self::of(file, chunks))
+        let held = match compression.order {
+            Order::Layers => check_layers(file, vlr, &chunks)?,
+            // Of the last one, the table says nothing.
+            _ => {
+                1 + chunks[..chunks.len() - 1]
+                    .iter()
+                    .map(|chunk| chunk.points)
+                    .sum::<u64>()
+            }
+        };
+        Ok((Self::of(file, chunks), held))
     }
 
     fn of(file: &Envelope, chunks: Vec<Chunk>) -> Self {
@@ -162,9 +171,10 @@ fn check_table(file: &Envelope, vlr: &LazVlr, chunks: &[Chunk]) -> Result<(), Cl
     Ok(())
 }
 
-/// Checks that no chunk of the table has layers that are larger than it.
-fn check_layers(file: &Envelope, vlr: &LazVlr, chunks: &[Chunk]) -> Result<(), CloudError> {
+/// Checks that no chunk of the table has layers that are larger than it; returns the sum of their points.
+fn check_layers(file: &Envelope, vlr: &LazVlr, chunks: &[Chunk]) -> Result<u64, CloudError> {
     let mut source = open(file)?;
+    let mut held = 0;
     for (number, chunk) in (1..).zip(chunks).filter(|(_, chunk)| chunk.bytes > 0) {
         let layers = layered_chunk(file, vlr, &mut source, chunk.start)?;
         if layers.bytes > chunk.bytes {
@@ -174,8 +184,9 @@ fn check_layers(file: &Envelope, vlr: &LazVlr, chunks: &[Chunk]) -> Result<(), C
             );
             return Err(CloudError::malformed(&file.path, reason));
         }
+        held += layers.points;
     }
-    Ok(())
+    Ok(held)
 }
 
 /// Walks from chunk to chunk by the sizes of their layers, for files without a table.

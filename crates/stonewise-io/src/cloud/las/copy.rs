@@ -25,11 +25,11 @@ pub fn copy_labelled<E: From<CloudError>>(
     let mut source = LasSource::open(input)?;
     let record = RecordCopy::new(input, &source.layout, columns)?;
     let mut writer = LazWriter::create(partial, name, builder(&source.layout, &record))?;
+    let units = source.layout.system.units;
     let mut chunk = PointChunk::default();
     let mut summary = ReadSummary::default();
     while let Some((first, data)) = source.next(STEP_POINTS)? {
-        summary.records += data.len() as u64;
-        summary.skipped += fill_chunk(&mut chunk, first, data);
+        summary += fill_chunk(&mut chunk, first, data, units);
         let labels = fill(&chunk)?;
         columns.check(name, &chunk, &labels)?;
         writer.write(record.copy(first, data, &chunk, &labels))?;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use las::GpsTimeType;
+use las::{GpsTimeType, Transform};
 
 use super::read::{LasSource, fill_chunk};
 use crate::cloud::extra_bytes::existing;
@@ -19,11 +19,11 @@ pub fn details(path: &Path, gathered: &mut Gathered) -> Result<(ReadSummary, Hea
         header.vlrs().iter().chain(&source.layout.extended),
         format.extra_bytes,
     );
+    let units = source.layout.system.units;
     let mut chunk = PointChunk::default();
     let mut summary = ReadSummary::default();
     while let Some((first, data)) = source.next(CHUNK_POINTS)? {
-        summary.records += data.len() as u64;
-        summary.skipped += fill_chunk(&mut chunk, first, data);
+        summary += fill_chunk(&mut chunk, first, data, units);
         gathered.add(&chunk);
         let fields = &mut gathered.fields;
         fields.extend("return_number", data.return_number().map(f64::from));
@@ -62,6 +62,8 @@ fn head(source: &LasSource) -> Head {
     let number = format.to_u8().unwrap_or_default() & 0x3f;
     let transforms = header.transforms();
     let axes = [transforms.x, transforms.y, transforms.z];
+    let step_m: [f64; 3] = source.layout.system.units.step_m().into();
+    let in_metres = |of: fn(&Transform) -> f64| std::array::from_fn(|k| of(&axes[k]) * step_m[k]);
     let software = header.generating_software().trim();
     Head {
         format: format!("{family} {}, point format {number}", header.version()),
@@ -72,8 +74,12 @@ fn head(source: &LasSource) -> Head {
             GpsTimeType::Standard => Clock::AdjustedGps,
         },
         rounding: Some(Rounding::Scaled {
-            scale: axes.map(|t| t.scale),
-            offset: axes.map(|t| t.offset),
+            scale: in_metres(|t| t.scale),
+            offset: in_metres(|t| t.offset),
         }),
+        crs: source.layout.system.text.clone(),
+        units: Some(source.layout.system.units),
+        claimed_bounds: source.layout.bounds(),
+        remarks: source.layout.remarks.clone(),
     }
 }

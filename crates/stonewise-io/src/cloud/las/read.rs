@@ -12,9 +12,13 @@ use super::unpack::LazReader;
 use crate::cloud::chunk::Visit;
 use crate::cloud::guard::guarded;
 use crate::cloud::{CloudError, PointChunk, ReadSummary};
+use crate::crs::Units;
 
 /// Bytes of records that are unpacked at a time, at most; a record has 65,535 at most.
 const MAX_STEP_BYTES: u64 = 1 << 27;
+
+/// Classes of points that no surface sent back: low points and high noise (LAS 1.4 R15, table 17).
+const NOISE: [u8; 2] = [7, 18];
 
 /// Points of a LAS file, some at a time, as raw records.
 pub struct LasSource {
@@ -37,8 +41,8 @@ impl LasSource {
         let records = match layout.packing.take() {
             Some(packing) => Records::Packed(LazReader::open(path, packing)?),
             None => Records::Plain(guarded(path, || {
-                let stream =
-                    LasStream::open(path, layout.record_count).map_err(|e| CloudError::read(path, e))?;
+                let header = layout.sound_header.clone();
+                let stream = LasStream::open(path, header).map_err(|e| CloudError::read(path, e))?;
                 Reader::new(stream).map_err(|e| las_error(path, e))
             })?),
         };
@@ -76,24 +80,43 @@ impl LasSource {
     }
 }
 
-/// Puts the points of raw records into a chunk; says how many were left out.
-pub fn fill_chunk(chunk: &mut PointChunk, first_index: u64, data: &PointData) -> u64 {
+/// Puts the points of raw records into a chunk, in metres; says how many there were, and how many were left out.
+pub fn fill_chunk(chunk: &mut PointChunk, first_index: u64, data: &PointData, units: Units) -> ReadSummary {
     chunk.indices.clear();
     chunk.positions.clear();
+    let mut summary = ReadSummary {
+        records: data.len() as u64,
+        ..ReadSummary::default()
+    };
     let positions = data.x().zip(data.y()).zip(data.z());
-    for (index, ((x, y), z)) in (first_index..).zip(positions) {
-        if x.is_finite() && y.is_finite() && z.is_finite() {
+    let usable = data.classification().zip(withheld(data));
+    for ((index, ((x, y), z)), (class, withheld)) in (first_index..).zip(positions).zip(usable) {
+        if !(x.is_finite() && y.is_finite() && z.is_finite()) {
+            summary.skipped += 1;
+        } else if withheld || NOISE.contains(&class) {
+            summary.unused += 1;
+        } else {
             chunk.indices.push(index);
-            chunk.positions.push(Point3::new(x, y, z));
+            chunk.positions.push(units.to_metres(Point3::new(x, y, z)));
         }
     }
+    chunk.unused = summary.unused;
     let indices = &chunk.indices;
     chunk.intensities = Some(kept(indices, first_index, data.intensity().map(f32::from)));
     let colors = data.rgb().map(|rgb| rgb.map(|(r, g, b)| [r, g, b]));
     chunk.colors = colors.map(|all| kept(indices, first_index, all));
     chunk.sources = Some(kept(indices, first_index, data.point_source_id()));
     chunk.times_s = data.gps_time().map(|all| kept(indices, first_index, all));
-    data.len() as u64 - chunk.len() as u64
+    summary
+}
+
+/// Whether each record is flagged as withheld: the last bit of the class, or a bit of its own in the extended formats
+/// (LAS 1.4 R15, tables 8 and 16).
+fn withheld(data: &PointData) -> impl Iterator<Item = bool> + '_ {
+    let place = 15;
+    let bit = if data.format().is_extended { 1 << 2 } else { 1 << 7 };
+    let records = data.raw_bytes().chunks_exact(data.record_len());
+    records.map(move |record| record[place] & bit != 0)
 }
 
 /// Values of the records that are kept, of one value for each record from `first_index` on.
@@ -112,11 +135,11 @@ pub fn read<E: From<CloudError>>(
     visit: Visit<'_, E>,
 ) -> Result<ReadSummary, E> {
     let mut source = LasSource::open(path)?;
+    let units = source.layout.system.units;
     let mut chunk = PointChunk::default();
     let mut summary = ReadSummary::default();
     while let Some((first, data)) = source.next(chunk_points)? {
-        summary.records += data.len() as u64;
-        summary.skipped += fill_chunk(&mut chunk, first, data);
+        summary += fill_chunk(&mut chunk, first, data, units);
         visit(&chunk)?;
     }
     Ok(summary)

@@ -8,6 +8,7 @@ use nalgebra::Point3;
 
 use super::header::{Element, Encoding, Header, Kind};
 use crate::cloud::chunk::{Chunker, PointRecord, Visit};
+use crate::cloud::colour_scale::{LOOK_POINTS, Seen, to_16_bits};
 use crate::cloud::lines::Lines;
 use crate::cloud::scalar::Scalar;
 use crate::cloud::{CloudError, ReadSummary};
@@ -30,6 +31,7 @@ pub fn read<E: From<CloudError>>(
     header.check_room(vertices + 1, lines.bytes_left()?, path)?;
     let mut values = Values::after_header(lines, header.encoding);
     let mut row = Vec::new();
+    let columns = columns.with_color_factor(path)?;
     let (has_color, has_intensity) = (columns.color.is_some(), columns.intensity.is_some());
     let mut chunker = Chunker::new(chunk_points, has_color, has_intensity, visit);
 
@@ -65,6 +67,8 @@ pub fn vertex_count(path: &Path) -> Result<u64, CloudError> {
 pub(super) struct Columns {
     pub(super) position: [usize; 3],
     color: Option<[(usize, Scalar); 3]>,
+    /// Multiplies floating colours to 16 bits.
+    color_factor: f64,
     intensity: Option<usize>,
 }
 
@@ -90,6 +94,7 @@ impl Columns {
                 [Some(r), Some(g), Some(b)] => Some([r, g, b]),
                 _ => None,
             },
+            color_factor: 65535.0,
             intensity: find(&["intensity", "scalar_intensity", "reflectance"]).map(|(place, _)| place),
         })
     }
@@ -99,20 +104,55 @@ impl Columns {
             position: Some(Point3::from(self.position.map(|place| row[place]))),
             color: self
                 .color
-                .map(|channels| channels.map(|(place, scalar)| to_16_bit(row[place], scalar))),
+                .map(|channels| channels.map(|(place, scalar)| self.to_16_bit(row[place], scalar))),
             intensity: self.intensity.map(|place| row[place] as f32),
         }
     }
-}
 
-/// A colour value: floats go from 0 to 1, 16-bit integers to 65535, all other integers to 255.
-fn to_16_bit(value: f64, scalar: Scalar) -> u16 {
-    let factor = match scalar {
-        Scalar::F32 | Scalar::F64 => 65535.0,
-        Scalar::U16 | Scalar::I16 => 1.0,
-        _ => 257.0,
-    };
-    (value * factor).round() as u16
+    /// A colour value: 16-bit integers go to 65535, all other integers to 255.
+    fn to_16_bit(&self, value: f64, scalar: Scalar) -> u16 {
+        let factor = match scalar {
+            Scalar::F32 | Scalar::F64 => self.color_factor,
+            Scalar::U16 | Scalar::I16 => 1.0,
+            _ => 257.0,
+        };
+        (value * factor).round() as u16
+    }
+
+    /// Looks at the first vertices where colours are floats, which go to 1, to 255 or to 65535.
+    fn with_color_factor(mut self, path: &Path) -> Result<Self, CloudError> {
+        let is_real = |(_, scalar): &(usize, Scalar)| matches!(scalar, Scalar::F32 | Scalar::F64);
+        let Some(channels) = self.color.filter(|channels| channels.iter().all(is_real)) else {
+            return Ok(self);
+        };
+        let mut lines = Lines::open(path)?;
+        let header = Header::read(&mut lines)?;
+        let mut values = Values::after_header(lines, header.encoding);
+        let mut row = Vec::new();
+        let mut seen = [Seen::default(); 3];
+        for element in &header.elements {
+            let is_vertex = element.name == "vertex";
+            let most = if is_vertex {
+                LOOK_POINTS as u64
+            } else {
+                element.count
+            };
+            for _ in 0..element.count.min(most) {
+                // An end of the file is met again while it is read.
+                if !values.next(path, element, &mut row)? {
+                    break;
+                }
+                for (seen, (place, _)) in seen.iter_mut().zip(channels).filter(|_| is_vertex) {
+                    seen.add(row[place]);
+                }
+            }
+            if is_vertex {
+                break;
+            }
+        }
+        self.color_factor = to_16_bits(seen, true);
+        Ok(self)
+    }
 }
 
 /// The values of the elements, one row at a time.

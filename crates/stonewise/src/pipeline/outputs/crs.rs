@@ -13,9 +13,14 @@ pub fn coordinate_system(project: &Project) -> Result<Option<Crs>> {
         let named = cloud_crs(cloud)?.as_deref().and_then(Crs::parse);
         match (&found, named) {
             (None, Some(crs)) => found = Some(crs),
-            (Some(known), Some(crs)) if known.epsg != crs.epsg => return Ok(None),
+            (Some(known), Some(crs)) if differ(known, &crs) => return Ok(None),
             _ => {}
         }
     }
     Ok(found)
+}
+
+/// Whether the codes of two systems differ.
+fn differ(one: &Crs, other: &Crs) -> bool {
+    one.epsg.zip(other.epsg).is_some_and(|(a, b)| a != b)
 }

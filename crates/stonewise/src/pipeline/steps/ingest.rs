@@ -8,12 +8,12 @@ use crate::project::Epoch;
 use crate::storage::epoch_tiles::EpochTiles;
 use crate::storage::step::{Key, StepDir};
 use crate::storage::tiles::{DiskTiles, Keeps, cut_into_tiles};
-use crate::texts::notices::INVALID_POINTS;
+use crate::texts::notices::{INVALID_POINTS, UNUSED_POINTS};
 use nalgebra::Point3;
 use std::sync::Arc;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::epoch::{EpochId, Pair};
-use stonewise_io::cloud::cloud_scans;
+use stonewise_io::cloud::{cloud_remarks, cloud_scans};
 
 /// Cuts the clouds of an epoch into tiles.
 pub static INGEST: Step = Step {
@@ -78,7 +78,7 @@ fn ingest(context: &Context, id: EpochId) -> Result<Ingested> {
 
     let step = context.step(&format!("ingest-{id}"), key, |step, warnings| {
         let takes_part = |p: &Point3<f64>| part.as_ref().is_none_or(|part| part.contains(p));
-        let invalid = cut_into_tiles(
+        let summary = cut_into_tiles(
             &epoch.clouds,
             epoch.sources,
             size_m,
@@ -86,9 +86,21 @@ fn ingest(context: &Context, id: EpochId) -> Result<Ingested> {
             step,
             context.progress,
         )?;
-        if invalid > 0 {
-            let message = INVALID_POINTS.say(&[("n", invalid.to_string().into())]);
+        let [all, invalid, unused] =
+            [summary.records, summary.skipped, summary.unused].map(|n| n.to_string());
+        if summary.skipped > 0 {
+            let message = INVALID_POINTS.say(&[("n", (&*invalid).into())]);
             warnings.notice("ingest", epoch.name.clone(), message);
+        }
+        if summary.unused > 0 {
+            let message = UNUSED_POINTS.say(&[("n", (&*unused).into()), ("all", (&*all).into())]);
+            warnings.notice("ingest", epoch.name.clone(), message);
+        }
+        for cloud in &epoch.clouds {
+            // The check says what is doubtful.
+            for remark in cloud_remarks(cloud)?.into_iter().filter(|r| !r.is_doubt) {
+                warnings.notice("ingest", cloud.to_string_lossy(), remark.text);
+            }
         }
         Ok(())
     })?;

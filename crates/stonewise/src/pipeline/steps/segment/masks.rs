@@ -21,6 +21,9 @@ pub fn write_labels(
 ) -> Result<Vec<VotingPhoto>> {
     let candidates = posed_photos(epoch, warnings)?;
     let source = MaskSource::open(masks)?;
+    for remark in source.remarks() {
+        warnings.notice(STEP, masks.to_string_lossy(), remark.as_str());
+    }
     context.progress.begin("photos", candidates.len() as u64);
     let read = candidates
         .par_iter()
@@ -50,6 +53,9 @@ pub fn write_labels(
     let mut photos = Vec::new();
     for ((view, path), labelled) in candidates.into_iter().zip(read) {
         let Some(labelled) = labelled else { continue };
+        for warning in labelled.warnings {
+            warnings.notice(STEP, path.to_string_lossy(), warning);
+        }
         write_label_png(&label_path(step, photos.len()), &labelled.labels)?;
         let instances = labelled.instances.into_iter().map(Instance::from).collect();
         photos.push(VotingPhoto {
