@@ -17,10 +17,6 @@ impl Words {
         &self.0
     }
 
-    pub fn has(&self, word: &str) -> bool {
-        self.0.iter().any(|w| w == word)
-    }
-
     /// What stands behind `KEY=`, or another prefix.
     pub fn after(&self, prefix: &str) -> Option<&str> {
         self.0.iter().find_map(|w| w.strip_prefix(prefix))

@@ -395,10 +395,19 @@ fn masks_that_a_run_cannot_use_are_found() {
     fs::write(project, text.replace("masks/epoch2.json", "masks/epoch2")).unwrap();
     fs::create_dir(&masks).unwrap();
     let of = |photo: &Path| masks.join(photo.file_name().unwrap()).with_extension("png");
-    let labels = LabelImage::filled(600, 450, 7);
-    for photo in photos(dir) {
-        write_label_png(&of(&photo), &labels).unwrap();
-    }
+    let write_all = |labels: &LabelImage| {
+        for photo in photos(dir) {
+            write_label_png(&of(&photo), labels).unwrap();
+        }
+    };
+    write_all(&LabelImage::filled(600, 450, 7));
+    let (code, table, log) = check(dir);
+    assert!(
+        code == 3 && table.contains("DOUBT  one single mask in each photo"),
+        "{table}{log}"
+    );
+    let halves = (0..600 * 450).map(|i| 7 + u32::from(i % 600 >= 300)).collect();
+    write_all(&LabelImage::from_vec(600, 450, halves).unwrap());
     let (code, table, log) = check(dir);
     assert!(
         code == 0 && table.contains("there for every photo (2): "),

@@ -64,7 +64,7 @@ images = "images"
 cameras = "cameras.xml"
 motion = { kind = "bulge", centre = [0.1, -0.3, 1.4], depth = 0.05, diameter = 4.0, direction = [1, 0, 0] }
 
-[tiles]
+[ingest]
 size_m = 4.0
 
 [registration]
