@@ -180,7 +180,7 @@ fn json(details: &CloudDetails) -> serde_json::Value {
         "format": details.format,
         "points": details.summary.records,
         "without_position": details.summary.skipped,
-        "not_used": details.summary.unused,
+        "withheld_or_noise": details.summary.unused,
         "bounds": details.bounds.as_ref().map(corners),
         "unit_m": details.units.plane_m,
         "height_unit_m": details.units.height_m,
