@@ -63,8 +63,8 @@
 //! A module uses only those before it, and those in braces never each other:
 //!
 //! ```text
-//! id < epoch < statistics < linalg < components < progress < parallel < params < geometry < raster < cloud
-//!    < stone < surface < {transfer | matching | registration | change | views | series | instruments} < evaluate
+//! switches < id < epoch < statistics < linalg < components < progress < parallel < params < geometry < raster
+//!    < cloud < stone < surface < {transfer | matching | registration | change | views | series | instruments} < evaluate
 //! ```
 
 pub use nalgebra;

@@ -27,7 +27,7 @@ pub fn run(words: &Words) -> Outcome {
     let columns = columns();
     let changes: Vec<Option<Change>> = columns
         .iter()
-        .map(|(name, _, better)| Change::of(&pairs(&first, &second, name, filter), *better))
+        .map(|(name, better)| Change::of(&pairs(&first, &second, name, filter), *better))
         .collect();
     let p: Vec<Option<f64>> = changes.iter().map(|c| c.as_ref().map(|c| c.p)).collect();
     let shown = discoveries(&p, FALSE_DISCOVERIES);
@@ -41,10 +41,10 @@ pub fn run(words: &Words) -> Outcome {
         "to",
         "",
     ]);
-    for (k, ((name, digits, _), change)) in columns.iter().zip(&changes).enumerate() {
+    for (k, ((name, _), change)) in columns.iter().zip(&changes).enumerate() {
         let Some(c) = change else { continue };
-        let number = |v: f64| format!("{v:.digits$}");
-        let loss = |v: f64| format!("{v:+.digits$}");
+        let number = |v: f64| format!("{v:.3}");
+        let loss = |v: f64| format!("{v:+.3}");
         table.row([
             name.clone(),
             c.surveys.to_string(),

@@ -23,53 +23,22 @@ pub enum Better {
     Near(f64),
 }
 
-/// A figure's name, decimals and direction.
-pub type Column = (String, usize, Better);
+/// Figures that are better the less they are, and the more.
+const LESS: &str = "in_rmse in_median out_rmse out_median absolute_rmse deformation_rmse velocity_rmse free_score \
+                    absolute_score relative_score deformation_score velocity_score pit islands false_verdict \
+                    missed_verdict areas_missed areas_false seconds memory_mb";
+const MORE: &str = "measured loose_precision loose_recall refused_odd areas_found areas_held creep_named steps_named \
+                    datum_known";
 
-/// All figures, in the order of the table.
-pub fn columns() -> Vec<Column> {
-    let less = [
-        "in_rmse",
-        "in_median",
-        "out_rmse",
-        "out_median",
-        "absolute_rmse",
-        "deformation_rmse",
-    ]
-    .into_iter()
-    .chain([
-        "velocity_rmse",
-        "free_score",
-        "absolute_score",
-        "relative_score",
-        "deformation_score",
-    ])
-    .chain([
-        "velocity_score",
-        "pit",
-        "islands",
-        "false_verdict",
-        "missed_verdict",
-    ])
-    .chain(["areas_missed", "areas_false"]);
-    let more = [
-        "measured",
-        "loose_precision",
-        "loose_recall",
-        "refused_odd",
-        "areas_found",
-        "areas_held",
-    ]
-    .into_iter()
-    .chain(["creep_named", "steps_named", "datum_known"]);
-    let column = |name: &str, better| (name.to_owned(), 3, better);
-    let mut all: Vec<Column> = less.map(|n| column(n, Better::Less)).collect();
-    all.extend(more.map(|n| column(n, Better::More)));
-    all.push(column("chi_square", Better::Near(1.0)));
+/// All figures by their names.
+pub fn columns() -> Vec<(String, Better)> {
+    let column = |better| move |name: &str| (name.to_owned(), better);
+    let mut all: Vec<_> = LESS.split(' ').map(column(Better::Less)).collect();
+    all.extend(MORE.split(' ').map(column(Better::More)));
+    all.push(("chi_square".to_owned(), Better::Near(1.0)));
     for kind in ["free", "absolute", "relative", "deformation", "velocity"] {
-        all.extend(LEVELS.map(|(level, text)| column(&format!("{kind}_{text}"), Better::Near(level))));
+        all.extend(LEVELS.map(|(level, text)| (format!("{kind}_{text}"), Better::Near(level))));
     }
-    all.extend(["seconds", "memory_mb"].map(|n| column(n, Better::Less)));
     all
 }
 
