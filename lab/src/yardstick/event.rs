@@ -160,7 +160,7 @@ fn mark_odd(wall: &mut Wall, ids: &[u32]) {
     }
 }
 
-/// The stones of the second epoch, every seventh with the next.
+/// Some stones of the second epoch, one in `every`, each with the next.
 fn some(wall: &Wall, every: usize) -> Vec<[u32; 2]> {
     let ids: Vec<u32> = wall.epochs[1].keys().copied().filter(|id| *id > 0).collect();
     let next = |(k, id): (usize, &u32)| (k % every == 3).then(|| [*id, ids[(k + 1) % ids.len()]]);
@@ -258,7 +258,7 @@ fn panel(
     wall.truth.insert(id, of_panel);
 }
 
-/// Motions of the stones must not lean on the place: there are none but this one.
+/// A block of the wall stands out and moves; the wall has no other motions.
 fn buttress(wall: &mut Wall, out_m: f64, moved_m: f64) {
     let inside: Vec<u32> = wall.epochs[0]
         .iter()

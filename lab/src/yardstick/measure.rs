@@ -52,7 +52,8 @@ pub struct Measured {
     pub is_deformed: bool,
     /// Whether each true area was found.
     pub areas: Vec<bool>,
-    /// Whether the interval of the size holds the true one, of areas that were found; none where other motions add to it.
+    /// Of areas that were found, whether the interval of the size holds the true one; none where other motions add to
+    /// it.
     pub held: Vec<bool>,
     /// Areas where nothing moved; `None` where the truth has motions besides those of areas and single stones.
     pub false_areas: Option<usize>,

@@ -1,10 +1,10 @@
 //! The yardstick: the one place where a change of the method is judged, on surveys of which the truth is known.
 //!
-//! `lab yardstick quick|full [--out FOLDER] [--filter NAME,...] [--off NAME,...] [--set KEY=VALUE,...] [--results FOLDER]`
-//! measures each survey whose name holds one of the NAMEs, writes its figures into FOLDER as a line of JSON (those that are there
-//! already are kept) and prints a table: a row is the mean of surveys that differ in their seed alone. `--off` switches
-//! mechanisms off (in a build with `--features switches`), `--set` sets parameters of the adjustment, `--results` holds
-//! results of runs of the real surveys, each in a folder of its name.
+//! `lab yardstick quick|full [--out FOLDER] [--filter NAME,...] [--off NAME,...] [--set KEY=VALUE,...]
+//! [--results FOLDER]` measures each survey whose name holds one of the NAMEs, writes its figures into FOLDER as a line
+//! of JSON (those that are there already are kept) and prints a table: a row is the mean of surveys that differ in their
+//! seed alone. `--off` switches mechanisms off (in a build with `--features switches`), `--set` sets parameters of the
+//! adjustment, `--results` holds results of runs of the real surveys, each in a folder of its name.
 //!
 //! `lab yardstick compare FOLDER FOLDER [--filter NAME]` says which figures of the second are better or worse than
 //! those of the first.

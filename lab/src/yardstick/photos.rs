@@ -3,9 +3,9 @@
 //! A stabiliser moves a lens element and with it the principal point of each photo (image-variant interior orientation:
 //! Tecklenburg, Luhmann and Hastedt 2001). A bundle with one shared camera turns and shifts the photos until most of it
 //! is compensated; the rest bends the cloud. With A the derivatives of image points by poses and by what the bundle
-//! estimates of the camera (focal length, radial distortion), B by the places of tie
-//! points and F the shift of the principal point, the bundle takes poses and camera for (A'PA)^-1 A'P F, P = I - B (B'B)^-1 B',
-//! and a place that is matched moves by (B'B)^-1 B' (F - A (poses, camera)).
+//! estimates of the camera (focal length, radial distortion), B by the places of tie points, F the shift of the
+//! principal point, and P = I - B (B'B)^-1 B', the bundle takes poses and camera for (A'PA)^-1 A'P F, and a place that
+//! is matched moves by (B'B)^-1 B' (F - A (poses, camera)).
 
 use super::points::{Points, SurveyPoint};
 use super::wall::Instrument;
