@@ -111,7 +111,7 @@ fn info_tells_what_a_surveyor_asks() {
         "reflectance -11.9 to 0",
         "  source 900: 1 point",
         "  and 100 more sources\n",
-        "  CRS PROJCS[\"ETRS89 / UTM zone 32N\"",
+        "  CRS ETRS89 / UTM zone 32N, without a code\n",
         "  PTX, 132 points\n  12 of them have no position\n",
         "  scan 2: 55 points, scanner at (350020.000, 5649980.000, 99.250)\n",
         "  no CRS\n",

@@ -237,7 +237,6 @@ fn mistakes_in_the_file_of_conditions_are_named_by_check() {
     fs::write(dir.path().join("stonewise.toml"), text).unwrap();
     let (code, said) = outcome(stonewise().arg("check").arg(dir.path().join("stonewise.toml")));
     assert_eq!(code, 2, "{said}");
-    let message =
-        "levels.csv:3: level_m: \"1.5m\" is no number: leave the cell empty where there is no reading";
+    let message = "levels.csv:3: level_m: \"1.5m\" is no number: leave the cell empty where there is none";
     assert!(said.contains(message), "{said}");
 }

@@ -141,7 +141,7 @@ fn check_places(file: &CameraFile, path: &Path) -> Result<(), CameraError> {
     ))
 }
 
-pub(super) fn extension(path: &Path) -> String {
+fn extension(path: &Path) -> String {
     path.extension()
         .map(|e| e.to_string_lossy().to_lowercase())
         .unwrap_or_default()

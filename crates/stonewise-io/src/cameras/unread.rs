@@ -1,6 +1,5 @@
 //! Camera files that are recognised only to say what to give instead.
 
-use super::read::extension;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -10,7 +9,7 @@ const HEAD: u64 = 4096;
 
 /// What to give instead of a camera file in a format that is not read; `None` for every other file.
 pub fn unread_cameras(path: &Path) -> Option<&'static str> {
-    let extension = extension(path);
+    let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     if !matches!(extension.as_str(), "json" | "out") {
         return None;
     }

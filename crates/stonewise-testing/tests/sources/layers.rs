@@ -141,7 +141,7 @@ const STUDIO: Layers = &[
 ];
 
 const CLI: Layers = &[
-    &["args", "counted", "note", "stdout", "steps"],
+    &["args", "counted", "gone", "note", "stdout", "steps"],
     &["screen"],
     &["printer"],
     &["commands"],

@@ -1,29 +1,13 @@
 //! The alignment of stones.
 
-use super::block::GicpBlock;
+use super::block::{GicpBlock, GicpStone};
 use super::params::GicpParams;
 use super::uncertainty::uncertainty;
 use super::window::Window;
 use crate::geometry::Rigid3;
-use crate::id::StoneId;
 use crate::stone::{MotionFailure, PairResult, StoneMotion};
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
-
-/// A matched stone inside a pair of blocks.
-#[derive(Clone, Debug)]
-pub struct GicpStone {
-    /// Stone of the first epoch.
-    pub first: StoneId,
-    /// Its partner in the second.
-    pub second: StoneId,
-    /// Centroid in the first epoch, world frame; the displacement is reported here.
-    pub centroid: Point3<f64>,
-    /// The stone's points, as indices into the cloud of the first block.
-    pub points: Vec<u32>,
-    /// Number of the partner's points.
-    pub points_second: usize,
-}
 
 /// Measures stones one by one: the motion of each with all points of the first block within
 /// [`GicpParams::buffer_m`] of any of its points, onto the nearest points of the second block.

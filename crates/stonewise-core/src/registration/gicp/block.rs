@@ -3,9 +3,25 @@
 use super::params::GicpParams;
 use crate::cloud::{Cloud, GridIndex};
 use crate::geometry::{CellMap, Moments, cell_of};
+use crate::id::StoneId;
 use crate::statistics::split_mix;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
+
+/// A matched stone inside a pair of blocks.
+#[derive(Clone, Debug)]
+pub struct GicpStone {
+    /// Stone of the first epoch.
+    pub first: StoneId,
+    /// Its partner in the second.
+    pub second: StoneId,
+    /// Centroid in the first epoch, world frame; the displacement is reported here.
+    pub centroid: Point3<f64>,
+    /// The stone's points, as indices into the cloud of the first block.
+    pub points: Vec<u32>,
+    /// Number of the partner's points.
+    pub points_second: usize,
+}
 
 /// Neighbours are sought no farther than this, metres: no survey of stones has its points that far apart.
 const FAR_M: f64 = 1.0;

@@ -13,8 +13,8 @@ mod params;
 mod uncertainty;
 mod window;
 
-pub use align::{GicpStone, align};
-pub use block::GicpBlock;
+pub use align::align;
+pub use block::{GicpBlock, GicpStone};
 pub use neighbours::relate_to_neighbours;
 pub use params::GicpParams;
 

@@ -1,7 +1,6 @@
 //! The window of a stone: the points that are aligned, and the motion that brings them onto their partners.
 
-use super::align::GicpStone;
-use super::block::GicpBlock;
+use super::block::{GicpBlock, GicpStone};
 use super::params::GicpParams;
 use crate::cloud::GridIndex;
 use crate::geometry::{Rigid3, lever};
