@@ -30,6 +30,9 @@ const LESS: &str = "in_rmse in_median out_rmse out_median absolute_rmse deformat
 const MORE: &str = "measured loose_precision loose_recall refused_odd areas_found areas_held creep_named steps_named \
                     datum_known";
 
+/// A stone: the truth of it, and what was found.
+type Stone = (Truth, Option<Found>);
+
 /// All figures by their names.
 pub fn columns() -> Vec<(String, Better)> {
     let column = |better| move |name: &str| (name.to_owned(), better);
@@ -46,7 +49,7 @@ pub fn columns() -> Vec<(String, Better)> {
 pub fn figures(measured: &Measured) -> Figures {
     let countable = || measured.stones.iter().filter(|(t, _)| t.is_countable);
     let found: Vec<&Found> = countable().filter_map(|(_, f)| f.as_ref()).collect();
-    let count = |of: &dyn Fn(&(Truth, Option<Found>)) -> bool| countable().filter(|s| of(s)).count() as f64;
+    let count = |of: &dyn Fn(&Stone) -> bool| countable().filter(|s| of(s)).count() as f64;
     let is_called = |f: &Option<Found>| f.as_ref().is_some_and(|f| f.is_called_loose);
     let all =
         |of: &dyn Fn(&Found) -> Option<Claim>| -> Vec<Claim> { found.iter().filter_map(|f| of(f)).collect() };
