@@ -1,5 +1,6 @@
 //! Images of anything: colours, depths, labels.
 
+mod closing;
 mod components;
 mod contour;
 mod polygon;
@@ -9,6 +10,7 @@ mod rle;
 mod srgb;
 mod sum_table;
 
+pub use closing::closed;
 pub use components::{Component, connected_components};
 pub use contour::{Ring, label_outlines};
 pub use polygon::fill_polygon;

@@ -4,7 +4,7 @@ use nalgebra::Point2;
 use serde::Serialize;
 use std::iter::StepBy;
 use std::ops::Range;
-use stonewise_core::raster::fill_polygon;
+use stonewise_core::raster::{closed, fill_polygon};
 
 /// Edge of a cell, metres; large walls have larger cells.
 const CELL_M: f64 = 0.02;
@@ -80,17 +80,15 @@ impl Cover {
     pub fn coverage(&self) -> Coverage {
         let is_wall = self.wall();
         let reach = ((0.5 * SQUARE_M / self.cell_m).round() as usize).max(1);
-        // The squares that fit: what is left where stones grow by half a square, grown back.
         let not_empty: Vec<bool> = is_wall
             .iter()
             .zip(&self.is_stone)
             .map(|(wall, stone)| !wall || *stone)
             .collect();
-        let middles: Vec<bool> = self.grown(&not_empty, reach).iter().map(|c| !c).collect();
-        let open = self.grown(&middles, reach);
+        let covered = closed(&not_empty, self.size[0], self.size[1], reach);
         let cells = is_wall.iter().filter(|w| **w).count();
         let share = |keep: &dyn Fn(usize) -> bool| {
-            (0..open.len()).filter(|&i| open[i] && keep(i)).count() as f64 / cells.max(1) as f64
+            (0..covered.len()).filter(|&i| !covered[i] && keep(i)).count() as f64 / cells.max(1) as f64
         };
         Coverage {
             face_m2: cells as f64 * self.cell_m * self.cell_m,
@@ -120,34 +118,6 @@ impl Cover {
             }
         }
         is_wall
-    }
-
-    /// Cells within a square of this reach around a marked cell.
-    fn grown(&self, cells: &[bool], reach: usize) -> Vec<bool> {
-        let mut along = cells.to_vec();
-        for row in self.rows() {
-            spread(cells, &mut along, row.clone(), reach);
-            spread(cells, &mut along, row.rev(), reach);
-        }
-        let mut grown = along.clone();
-        for column in self.columns() {
-            spread(&along, &mut grown, column.clone(), reach);
-            spread(&along, &mut grown, column.rev(), reach);
-        }
-        grown
-    }
-}
-
-/// Marks the cells of a line that follow a marked one within `reach`.
-fn spread(from: &[bool], to: &mut [bool], line: impl Iterator<Item = usize>, reach: usize) {
-    let mut left = 0;
-    for cell in line {
-        left = if from[cell] {
-            reach + 1
-        } else {
-            left.saturating_sub(1)
-        };
-        to[cell] |= left > 0;
     }
 }
 
