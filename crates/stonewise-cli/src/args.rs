@@ -263,9 +263,6 @@ pub struct PlanArgs {
     /// Only units of this rank: they need units of lower ranks only.
     #[arg(long, value_name = "N", requires = "ids")]
     pub rank: Option<usize>,
-    /// Of version 1 of the plan.
-    #[arg(long, hide = true)]
-    pub batch_points: Option<String>,
 }
 
 /// Arguments of `unit`.

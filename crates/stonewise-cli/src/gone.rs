@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 
 /// Words that are gone, and what takes their place.
-const GONE: [(&str, &str); 2] = [
+const GONE: [(&str, &str); 3] = [
     (
         "sensitivity",
         "`experiment sensitivity` is gone: simulate a survey with each value (`stonewise simulate --params FILE`, the \
@@ -13,6 +13,10 @@ const GONE: [(&str, &str); 2] = [
         "--train-minutes",
         "`--train-minutes` is gone: train the detector first (`stonewise train --data MASKS --images PHOTOS`), then name it \
          in the project file ([segment] model) and leave out `masks`",
+    ),
+    (
+        "--batch-points",
+        "`--batch-points` is gone: a unit is a whole step or one photo now: leave it out",
     ),
 ];
 

@@ -9,14 +9,9 @@ use crate::stdout::stdout;
 use anyhow::Result;
 use serde_json::Map;
 use std::io::Write;
-use stonewise::Error;
 
 /// Plans the units of a project and prints them.
 pub fn plan(args: &PlanArgs, force: bool, printer: &Printer) -> Result<Outcome> {
-    if args.batch_points.is_some() {
-        let message = "--batch-points: a unit is a whole step or one photo now: leave it out";
-        return Err(Error::Parameters(message.to_owned()).into());
-    }
     let (project, out) = (&args.project.project, &args.project.out);
     let coordinator = stonewise::plan(project, &Map::new(), out, force, printer)?;
     printer.finish();
