@@ -1,4 +1,4 @@
-//! The files of a folder.
+//! The files of a folder, and the kinds of files by their names.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -46,6 +46,12 @@ fn entries(folder: &Path) -> io::Result<Vec<PathBuf>> {
     entries.retain(|path| !is_hidden(path));
     entries.sort();
     Ok(entries)
+}
+
+/// What stands behind the last point of a file's name, in small letters; empty where there is none.
+pub(crate) fn extension(path: &Path) -> String {
+    let extension = path.extension().unwrap_or_default();
+    extension.to_string_lossy().to_lowercase()
 }
 
 #[cfg(all(test, unix))]

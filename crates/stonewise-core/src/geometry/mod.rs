@@ -31,7 +31,7 @@ pub use plane::Plane;
 pub use rigid::Rigid3;
 pub use ring::{is_simple, ring_contains, signed_area, simplify_ring};
 pub use ring_index::RingIndex;
-pub use rotation::nearest_rotation;
+pub use rotation::{nearest_rotation, rotation_of};
 pub use small_motion::{DisplacementSample, SmallMotion, lever};
 pub use strain::Strain;
 pub use triangulate::triangulate;

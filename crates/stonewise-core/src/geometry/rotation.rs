@@ -1,6 +1,15 @@
 //! Rotations from matrices.
 
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+
+/// Largest difference of a quaternion's length from 1 that is taken for rounding.
+const MOST_UNLIKE_ONE: f64 = 0.1;
+
+/// The rotation of a quaternion read from text or from a file; `None` where its length is not 1 but for rounding.
+pub fn rotation_of(quaternion: Quaternion<f64>) -> Option<UnitQuaternion<f64>> {
+    let is_unit = (quaternion.norm() - 1.0).abs() < MOST_UNLIKE_ONE;
+    is_unit.then(|| UnitQuaternion::from_quaternion(quaternion))
+}
 
 /// The rotation nearest to a matrix in the sense of least squares (Kabsch 1976), for matrices read from text.
 pub fn nearest_rotation(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {

@@ -6,6 +6,7 @@ use super::{
     CameraError, CameraFile, MapFrame, colmap, malformed, metashape, opensfm, opf, pix4d, realitycapture,
     unread_cameras,
 };
+use crate::folder::extension;
 use std::path::Path;
 use stonewise_core::geometry::View;
 
@@ -139,10 +140,4 @@ fn check_places(file: &CameraFile, path: &Path) -> Result<(), CameraError> {
         place,
         "its rotation and translation give no place",
     ))
-}
-
-fn extension(path: &Path) -> String {
-    path.extension()
-        .map(|e| e.to_string_lossy().to_lowercase())
-        .unwrap_or_default()
 }

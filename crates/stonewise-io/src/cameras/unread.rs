@@ -1,5 +1,6 @@
 //! Camera files that are recognised only to say what to give instead.
 
+use crate::folder::extension;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -9,7 +10,7 @@ const HEAD: u64 = 4096;
 
 /// What to give instead of a camera file in a format that is not read; `None` for every other file.
 pub fn unread_cameras(path: &Path) -> Option<&'static str> {
-    let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+    let extension = extension(path);
     if !matches!(extension.as_str(), "json" | "out") {
         return None;
     }

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use e57::{CartesianCoordinate, E57Reader, Point, PointCloud, RecordDataType, RecordName};
 use nalgebra::{Point3, Quaternion};
+use stonewise_core::geometry::rotation_of;
 
 use super::chunk::{Chunker, PointRecord, Visit};
 use super::guard::guarded;
@@ -14,9 +15,6 @@ use super::{CloudError, ReadSummary, Remark};
 
 /// Points decoded between two checks for an interruption.
 const STEP_POINTS: usize = 8192;
-
-/// Largest difference of a quaternion's length from 1 that is taken for rounding, as in the poses of images.
-const MOST_UNLIKE_ONE: f64 = 0.1;
 
 type Reader = E57Reader<BufReader<File>>;
 
@@ -67,7 +65,7 @@ pub fn remarks(path: &Path) -> Result<Vec<Remark>, CloudError> {
     let unturned = scans.filter(|(_, scan)| {
         scan.transform
             .as_ref()
-            .is_some_and(|t| length(&t.rotation) == 0.0)
+            .is_some_and(|t| is_zero(&quaternion(&t.rotation)))
     });
     let remark = |(number, scan): (usize, PointCloud)| {
         let name = name_of(number, &scan);
@@ -103,18 +101,17 @@ fn posed(path: &Path, reader: &Reader) -> Result<Vec<PointCloud>, CloudError> {
         let Some(pose) = &mut scan.transform else {
             continue;
         };
-        let q = &mut pose.rotation;
-        let length = length(q);
-        if length == 0.0 {
-            *q = e57::Quaternion::default();
-        } else if (length - 1.0).abs() < MOST_UNLIKE_ONE {
-            for part in [&mut q.w, &mut q.x, &mut q.y, &mut q.z] {
-                *part /= length;
-            }
+        let stated = quaternion(&pose.rotation);
+        if is_zero(&stated) {
+            pose.rotation = e57::Quaternion::default();
+        } else if let Some(turn) = rotation_of(stated) {
+            let [x, y, z, w] = turn.coords.into();
+            pose.rotation = e57::Quaternion { w, x, y, z };
         } else {
             let reason = format!(
-                "the rotation of {} is a quaternion of length {length}, which must be 1: export it again",
-                name_of(number, scan)
+                "the rotation of {} is a quaternion of length {}, which must be 1: export it again",
+                name_of(number, scan),
+                stated.norm()
             );
             return Err(CloudError::malformed(path, reason));
         }
@@ -122,8 +119,12 @@ fn posed(path: &Path, reader: &Reader) -> Result<Vec<PointCloud>, CloudError> {
     Ok(scans)
 }
 
-fn length(q: &e57::Quaternion) -> f64 {
-    Quaternion::new(q.w, q.x, q.y, q.z).norm()
+fn quaternion(q: &e57::Quaternion) -> Quaternion<f64> {
+    Quaternion::new(q.w, q.x, q.y, q.z)
+}
+
+fn is_zero(quaternion: &Quaternion<f64>) -> bool {
+    quaternion.norm() == 0.0
 }
 
 fn read_scan<E: From<CloudError>>(

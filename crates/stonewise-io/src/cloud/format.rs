@@ -6,6 +6,7 @@ use std::io::Read;
 use std::path::Path;
 
 use super::CloudError;
+use crate::folder::extension;
 
 /// A family of point cloud files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,7 +38,7 @@ impl CloudFormat {
         File::open(path)
             .and_then(|file| file.take(8).read_to_end(&mut start))
             .map_err(|e| CloudError::read(path, e))?;
-        let extension = lower_extension(path);
+        let extension = extension(path);
         match start.as_slice() {
             s if s.starts_with(b"LASF") => Ok(Self::Las),
             s if s.starts_with(b"ASTM-E57") => Ok(Self::E57),
@@ -54,12 +55,7 @@ impl CloudFormat {
 
 /// Whether a file is, by its name, a cloud in a format that is not read.
 pub fn is_unread_cloud(path: &Path) -> bool {
-    UNREAD_EXTENSIONS.contains(&lower_extension(path).as_str())
-}
-
-fn lower_extension(path: &Path) -> String {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    extension.to_ascii_lowercase()
+    UNREAD_EXTENSIONS.contains(&extension(path).as_str())
 }
 
 impl fmt::Display for CloudFormat {

@@ -25,4 +25,4 @@ pub use projection::{MapOrigin, Projection};
 pub use projjson::projjson;
 pub use system::Crs;
 pub(crate) use units::unit_of_code;
-pub use units::{UnitName, Units, in_metres};
+pub use units::{UnitName, Units, in_metres, is_foot};

@@ -101,13 +101,17 @@ impl Units {
     }
 }
 
+/// Whether a unit of this size is a foot: the international one, that of the US survey, or one of older maps.
+pub fn is_foot(size_m: f64) -> bool {
+    (size_m - 0.3048).abs() < 1e-5
+}
+
 /// As `feet (0.3048 m)`; units without a name here by their size alone.
 pub struct UnitName(pub f64);
 
 impl fmt::Display for UnitName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // International, US survey, and those of older maps.
-        match (self.0 - 0.3048).abs() < 1e-5 {
+        match is_foot(self.0) {
             true => write!(f, "feet ({} m)", self.0),
             false => write!(f, "units of {} m", self.0),
         }

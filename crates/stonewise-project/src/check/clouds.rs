@@ -14,7 +14,7 @@ use stonewise_base::messages::notices::UNUSED_POINTS;
 use stonewise_base::messages::{Message, Said};
 use stonewise_base::settings::Align;
 use stonewise_core::geometry::Bounds;
-use stonewise_io::crs::{Crs, Units};
+use stonewise_io::crs::{Crs, Units, is_foot};
 
 /// Metres in a unit that somebody may have exported, by its name.
 static UNIT_NAMES: [(&Message, f64); 4] = [
@@ -180,8 +180,7 @@ fn unit(size_m: f64) -> Said {
     let size = [("m", Said::numbers(size_m.to_string()))];
     match () {
         () if size_m == 1.0 => (&METRES).into(),
-        // International, US survey, and those of older maps.
-        () if (size_m - 0.3048).abs() < 1e-5 => SIZED_FEET.say(&size),
+        () if is_foot(size_m) => SIZED_FEET.say(&size),
         () => SIZED_UNIT.say(&size),
     }
 }

@@ -11,11 +11,11 @@ mod write;
 pub use write::write_colmap;
 
 use super::{CameraError, CameraFile};
-use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use nalgebra::{Quaternion, Translation3};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::path::{Path, PathBuf};
-use stonewise_core::geometry::{Camera, Rigid3, View};
+use stonewise_core::geometry::{Camera, Rigid3, View, rotation_of};
 use stonewise_core::id::ImageId;
 
 /// Whether a folder holds a COLMAP model, in itself or in its `sparse/0`, `sparse` or `0`.
@@ -73,20 +73,17 @@ fn read_pair(cameras: &Path, images: &Path) -> Result<CameraFile, CameraError> {
             }
         };
         let [w, x, y, z] = raw.rotation_wxyz;
-        let quaternion = Quaternion::new(w, x, y, z);
-        if !((quaternion.norm() - 1.0).abs() < 0.1 && raw.translation.iter().all(|v| v.is_finite())) {
+        let turn = rotation_of(Quaternion::new(w, x, y, z));
+        let Some(turn) = turn.filter(|_| raw.translation.iter().all(|v| v.is_finite())) else {
             return Err(bad(format!(
                 "photo {} has no valid rotation and translation",
                 raw.name
             )));
-        }
+        };
         file.views.push(View {
             image: ImageId(file.views.len() as u32),
             camera,
-            cam_from_world: Rigid3::from_parts(
-                Translation3::from(raw.translation),
-                UnitQuaternion::from_quaternion(quaternion),
-            ),
+            cam_from_world: Rigid3::from_parts(Translation3::from(raw.translation), turn),
             name: raw.name,
         });
     }

@@ -10,7 +10,7 @@ use nalgebra::{Point3, Quaternion, UnitQuaternion};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
-use stonewise_core::geometry::{Camera, Distortion};
+use stonewise_core::geometry::{Camera, Distortion, rotation_of};
 
 /// An open E57 file.
 pub struct E57Images {
@@ -179,9 +179,9 @@ fn camera(lens: &PinholeImageProperties) -> Option<Camera> {
 fn pose_of(pose: &Transform) -> Option<(Point3<f64>, UnitQuaternion<f64>)> {
     let (t, r) = (&pose.translation, &pose.rotation);
     let centre = Point3::new(t.x, t.y, t.z);
-    let quaternion = Quaternion::new(r.w, r.x, r.y, r.z);
-    let is_possible = (quaternion.norm() - 1.0).abs() < 0.1 && centre.iter().all(|c| c.is_finite());
-    is_possible.then(|| (centre, UnitQuaternion::from_quaternion(quaternion).inverse()))
+    let turn =
+        rotation_of(Quaternion::new(r.w, r.x, r.y, r.z)).filter(|_| centre.iter().all(|c| c.is_finite()))?;
+    Some((centre, turn.inverse()))
 }
 
 /// Runs a step of the library; its error, or its panic, becomes one that names file and place.
