@@ -17,6 +17,7 @@ mod event;
 mod figures;
 mod measure;
 mod photos;
+mod plan;
 mod points;
 mod series;
 mod stored;

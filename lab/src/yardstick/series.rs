@@ -2,7 +2,7 @@
 
 use super::figures::{Figures, LEVELS, coverage, interval_score};
 use super::measure::{Failure, Pair};
-use super::wall::Plan;
+use super::plan::Plan;
 use crate::figures::rms;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};

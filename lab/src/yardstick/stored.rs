@@ -2,7 +2,7 @@
 
 use super::event::Event;
 use super::points::{Points, SurveyPoint, mean};
-use super::wall::{Truth, Wall};
+use super::wall::{LEAST_SEEN, Truth, Wall};
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -10,9 +10,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::Rigid3;
-
-/// Share of a face that both epochs show, at least, of stones that count.
-const LEAST_SEEN: f64 = 0.35;
+use stonewise_io::table::{CsvFile, CsvRow};
 
 /// A survey on disk.
 pub enum Stored {
@@ -232,16 +230,15 @@ fn points(path: &Path, label: impl Fn(&[u8]) -> &[u8]) -> Result<Points, String>
     Ok(points)
 }
 
-/// The rows of a CSV file without quoted commas, by column.
+/// The rows of a CSV file, by column.
 fn table(path: &Path) -> Result<Vec<BTreeMap<String, String>>, String> {
-    let text = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let mut lines = text.lines();
-    let head: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-    let row = |line: &str| {
-        head.iter()
-            .map(ToString::to_string)
-            .zip(line.split(',').map(str::to_owned))
+    let bytes = fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let file = CsvFile::parse(path, bytes).map_err(|e| e.to_string())?;
+    let cells = |row: CsvRow<'_>| {
+        let head = file.head().iter().enumerate();
+        head.map(|(i, name)| (name.clone(), row.text(i).to_owned()))
             .collect()
     };
-    Ok(lines.map(row).collect())
+    let rows = file.rows().map(|row| row.map(cells).map_err(|e| e.to_string()));
+    rows.collect()
 }

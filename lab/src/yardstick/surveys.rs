@@ -6,9 +6,10 @@
 use super::event::Event;
 use super::figures::{Figures, figures};
 use super::measure::{Failure, measure};
+use super::plan::{Instrument, Plan};
 use super::series::Series;
 use super::stored::Stored;
-use super::wall::{Instrument, Plan, Wall};
+use super::wall::Wall;
 use crate::figures::{peak_memory_mb, processor_seconds, reset_peak_memory};
 use stonewise_core::registration::AdjustmentParams;
 use stonewise_simulate::{StripDrift, WallMotion};
