@@ -3,9 +3,11 @@
 pub mod check;
 mod conditions;
 mod dated_csv;
+mod distances;
 pub mod edits;
 mod init;
 mod instruments;
+mod origin;
 mod project_file;
 mod project_parameters;
 mod project_type;
@@ -15,8 +17,10 @@ pub mod sources;
 mod split;
 
 pub use conditions::{ConditionsAt, ConditionsFile};
+pub use distances::Distance;
 pub use init::{Initialised, Proposal, init, propose};
 pub use instruments::{AxisMotion, Instrument, InstrumentFile, ReadingGap};
+pub use origin::Origin;
 pub use project_type::{Epoch, PhotoFiles, Project};
 pub use scans::{ScansProject, is_scan};
 pub use schema::project_schema;

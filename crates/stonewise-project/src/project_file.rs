@@ -2,8 +2,10 @@
 
 use super::{Epoch, PhotoFiles, Project};
 use crate::conditions::ConditionsFile;
+use crate::distances::{RawDistances, distances, read_raw};
 use crate::edits::EditsFile;
 use crate::instruments::InstrumentFile;
+use crate::origin::Origin;
 use crate::sources::SourceRule;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -90,6 +92,9 @@ pub(super) struct RawProject {
     /// Other instruments: pendulums, targets, levelling.
     #[serde(default)]
     instruments: Vec<RawInstruments>,
+    /// Known lengths, each an observation of the scale of its epoch.
+    #[serde(default, deserialize_with = "read_raw")]
+    distances: Option<RawDistances>,
 }
 
 #[derive(Deserialize, JsonSchema)]
@@ -218,6 +223,10 @@ struct RawEpoch {
     /// Name of an earlier epoch of the same survey: a source in both has the same error in both.
     #[schemars(with = "Option<String>")]
     same_survey_as: Option<Spanned<String>>,
+    /// What the points come from. Absent: intensities or times show a scanner, colours alone photos.
+    origin: Option<Origin>,
+    /// Name of the bundle adjustment that gave the cameras. Absent: epochs with a camera of equal parameters share one.
+    bundle: Option<String>,
 }
 
 impl Project {
@@ -295,10 +304,22 @@ impl Project {
             notes.extend(add_conditions(file, &mut epochs));
         }
         let instruments = raw.instruments.into_iter().map(|i| source.instruments(i));
-        let instruments = instruments.collect::<Result<_>>()?;
+        let instruments: Vec<InstrumentFile> = instruments.collect::<Result<_>>()?;
         if let Some(name) = &raw.project.reference {
             notes.extend(source.put_reference_first(name, &mut epochs)?);
         }
+        let line = |number: Option<usize>| {
+            let key = number.map_or_else(|| "distances".to_owned(), |k| format!("distances.{k}"));
+            text.get(..source.place(&key).start)
+                .unwrap_or("")
+                .matches('\n')
+                .count()
+                + 1
+        };
+        let distances = raw
+            .distances
+            .map(|raw| distances(raw, path, line, &epochs, &instruments));
+        let distances = distances.transpose()?.unwrap_or_default();
         let edits = raw.edits.map(|edits| source.edits(edits, &epochs)).transpose()?;
         Ok(Self {
             path: path.to_path_buf(),
@@ -309,6 +330,7 @@ impl Project {
             edits,
             conditions,
             instruments,
+            distances,
             part: None,
         })
     }
@@ -417,6 +439,8 @@ impl Source<'_> {
                 .same_survey_as
                 .map(|name| self.earlier(&name, earlier))
                 .transpose()?,
+            origin: raw.origin,
+            bundle: raw.bundle,
         })
     }
 

@@ -1,8 +1,10 @@
 //! A project: which surveys, and every parameter.
 
 use crate::conditions::ConditionsFile;
+use crate::distances::Distance;
 use crate::edits::EditsFile;
 use crate::instruments::InstrumentFile;
+use crate::origin::Origin;
 use crate::sources::SourceRule;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -38,6 +40,8 @@ pub struct Project {
     pub conditions: Option<ConditionsFile>,
     /// Files of other instruments.
     pub instruments: Vec<InstrumentFile>,
+    /// Known lengths.
+    pub distances: Vec<Distance>,
     /// Which points take part; all where absent. No key of the file: commands set it.
     pub part: Option<Part>,
 }
@@ -64,6 +68,10 @@ pub struct Epoch {
     /// The earlier epoch of whose survey this one is another part: the same source then has the same
     /// error in both.
     pub same_survey_as: Option<EpochId>,
+    /// What the points come from; absent: as the files show it.
+    pub origin: Option<Origin>,
+    /// Name of the bundle adjustment that gave the cameras; absent: equal cameras mean one.
+    pub bundle: Option<String>,
     /// What the project file says about where the clouds lie on the map.
     pub map: MapFrame,
 }
@@ -164,6 +172,8 @@ impl Project {
             motion: None,
             sources: SourceRule::default(),
             same_survey_as: None,
+            origin: None,
+            bundle: None,
             map: MapFrame::default(),
         };
         Self {
@@ -178,6 +188,7 @@ impl Project {
             edits: None,
             conditions: None,
             instruments: Vec::new(),
+            distances: Vec::new(),
             part: None,
         }
     }

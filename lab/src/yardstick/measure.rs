@@ -80,7 +80,7 @@ impl Pair {
         let places = pairs.iter().map(|p| (p.first, p.centroid)).collect();
         let report = adjust(&MemoryPairs::new(pairs), params, &Silent)?;
         let seen = Seen::new(wall, &report);
-        let errors = seen.errors(&report)?;
+        let errors = seen.errors(wall, &report)?;
         let joint = errors.joint.as_ref().map(|e| (e, seen.ids.as_slice()));
         let deformation = match &report.joint {
             Some(motions) => deformation(motions, joint, &Silent)?,
@@ -313,9 +313,10 @@ impl Seen {
         }
     }
 
-    fn errors(&self, report: &AdjustmentReport) -> Result<EpochErrors, Failure> {
+    fn errors(&self, wall: &Wall, report: &AdjustmentReport) -> Result<EpochErrors, Failure> {
         let pair = EpochPair {
             stable: &self.stable,
+            network: wall.network.as_ref(),
             response: report.joint.as_ref().map(|motions| Response {
                 motions,
                 stones: &self.ids,

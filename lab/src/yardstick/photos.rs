@@ -8,10 +8,15 @@
 //! is matched moves by (B'B)^-1 B' (F - A (poses, camera)).
 
 use super::points::{Points, SurveyPoint};
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x3, Matrix3, Point3, Vector2, Vector3};
+use nalgebra::{
+    DMatrix, DVector, Matrix2, Matrix2x3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector2,
+    Vector3,
+};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use stonewise_core::geometry::{DisplacementSample, SmallMotion};
+use stonewise_core::geometry::{Camera, DisplacementSample, Rigid3, SmallMotion, View};
+use stonewise_core::id::ImageId;
+use stonewise_core::registration::observers::PhotoNetwork;
 use stonewise_simulate::{Noise, Scan, normal};
 
 /// Photos of an epoch, in a row.
@@ -19,6 +24,8 @@ const PHOTOS: usize = 4;
 /// Distance from the wall, and focal length in pixels: 3.8 mm a pixel.
 const DISTANCE_M: f64 = 4.5;
 const FOCAL_PX: f64 = 1200.0;
+/// Side of a photo, which shows the whole wall.
+const SIDE_PX: u32 = 4000;
 /// Standard deviation of a principal point per axis, pixels.
 const PRINCIPAL_PX: f64 = 3.0;
 /// Places of tie points along and up the wall.
@@ -46,6 +53,7 @@ struct Photo {
 /// What the photos of both epochs get wrong.
 pub struct PhotoErrors {
     epochs: [Epoch; 2],
+    is_joint: bool,
     seed: u64,
 }
 
@@ -93,7 +101,23 @@ impl PhotoErrors {
             };
             free.on_control_points(&ties)
         });
-        Self { epochs, seed }
+        Self {
+            epochs,
+            is_joint,
+            seed,
+        }
+    }
+
+    /// The photos as a project names them: without what is wrong in them.
+    pub fn network(&self) -> PhotoNetwork {
+        PhotoNetwork {
+            photos: self
+                .epochs
+                .each_ref()
+                .map(|epoch| epoch.photos.iter().map(Photo::view).collect()),
+            is_joint: self.is_joint,
+            shifts: Vec::new(),
+        }
     }
 
     /// The places that a scan truly met, as matching the photos of an epoch shows them.
@@ -167,6 +191,17 @@ impl Epoch {
 }
 
 impl Photo {
+    fn view(&self) -> View {
+        let turn = Rotation3::from_matrix_unchecked(self.axes);
+        let turn = UnitQuaternion::from_rotation_matrix(&turn);
+        View {
+            image: ImageId(0),
+            name: String::new(),
+            camera: Camera::pinhole(SIDE_PX, SIDE_PX, FOCAL_PX),
+            cam_from_world: Rigid3::from_parts(Translation3::from(-(turn * self.centre.coords)), turn),
+        }
+    }
+
     /// The image point by focal length and radial distortion, both relative; pixels.
     fn by_camera(&self, place: &Point3<f64>) -> Matrix2<f64> {
         let p = self.axes * (place - self.centre);

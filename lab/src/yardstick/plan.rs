@@ -127,6 +127,7 @@ impl Plan {
             is_still: self.motions.is_empty(),
             has_times: self.instruments.map(|i| !matches!(i, Instrument::Photos { .. })),
             has_stable: self.has_stable,
+            network: matches!(self.instruments[1], Instrument::Photos { .. }).then(|| photos.network()),
         };
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0xe7e7);
         for event in &self.events {

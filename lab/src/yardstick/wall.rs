@@ -4,6 +4,7 @@ use super::points::Points;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use stonewise_core::geometry::Rigid3;
+use stonewise_core::registration::observers::PhotoNetwork;
 
 /// Share of a face that must be seen in both epochs for the stone to count.
 pub const LEAST_SEEN: f64 = 0.35;
@@ -56,4 +57,6 @@ pub struct Wall {
     pub has_times: [bool; 2],
     /// Whether what stands before the wall is named as stable.
     pub has_stable: bool,
+    /// The photos from which the clouds were computed, where they were.
+    pub network: Option<PhotoNetwork>,
 }

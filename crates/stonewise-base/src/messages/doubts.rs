@@ -103,13 +103,13 @@ messages! {
 
         STRETCHED = "wrong-scale":
             "the wall changed its size by {strain} +- {half_width} mm per metre, and by {lesser} mm per metre in the direction that \
-            changed least. Moisture and temperature change masonry by at most 1 mm per metre, so most likely the cloud of one epoch \
-            has a wrong scale, and then motions, intervals and limits are wrong. Check the scale of scanner and photogrammetric \
-            block, and the map projection with its scale factor, in both epochs",
+            changed least. Temperature explains 0.3 mm per metre, so the cloud of one epoch may have a wrong scale: the common \
+            stretch counts as an error, not as a motion. A known length in each epoch decides it: name it in [[distances]]. Check the \
+            scale of scanner and photogrammetric block, and the map projection with its scale factor",
             "die Mauer hat ihre Größe um {strain} +- {half_width} mm je Meter geändert, in der Richtung der kleinsten Änderung um \
-            {lesser} mm je Meter. Feuchte und Temperatur ändern Mauerwerk um höchstens 1 mm je Meter; wahrscheinlich hat also die \
-            Punktwolke einer Epoche einen falschen Maßstab, und dann sind Bewegungen, Intervalle und Grenzen falsch. In beiden Epochen \
-            den Maßstab von Scanner und Bildverband und die Kartenprojektion mit ihrem Maßstabsfaktor prüfen";
+            {lesser} mm je Meter. Temperatur erklärt 0,3 mm je Meter; die Punktwolke einer Epoche kann also einen falschen Maßstab \
+            haben: die gemeinsame Dehnung gilt als Fehler, nicht als Bewegung. Eine bekannte Länge in jeder Epoche entscheidet es: sie \
+            gehört in [[distances]]. Den Maßstab von Scanner und Bildverband und die Kartenprojektion mit ihrem Maßstabsfaktor prüfen";
 
         TURNED = "turned-epoch":
             "this epoch is turned by {angle} degrees against the first as a whole. Motions are computed for small rotations: here they \

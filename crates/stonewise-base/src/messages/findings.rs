@@ -11,6 +11,20 @@ messages! {
             "{x} x {y} x {z} m, {points} Punkte: sind die Koordinaten in Metern? Die Punktwolke auf das Bauwerk zuschneiden";
         TOO_SMALL = "extent": "{x} x {y} x {z} m, {points} points: are the coordinates in metres?",
             "{x} x {y} x {z} m, {points} Punkte: sind die Koordinaten in Metern?";
+        FROM_SCANNER = "origin": "points from a scanner", "Punkte von einem Scanner";
+        FROM_PHOTOS = "origin": "points from photos", "Punkte aus Fotos";
+        FROM_UNKNOWN = "origin": "neither intensities nor times nor colours show what the points come from; they count as scanned: say so \
+                     with origin = \"scanner\" or \"photos\" in the epoch",
+            "weder Intensitäten noch Zeiten noch Farben zeigen, woher die Punkte stammen; sie gelten als gescannt: das mit origin = \
+            \"scanner\" oder \"photos\" in der Epoche angeben";
+        ONE_BUNDLE = "origin": "its photos and those of the first epoch were adjusted in one bundle",
+            "ihre Fotos und die der ersten Epoche wurden gemeinsam ausgeglichen";
+        OWN_BUNDLE = "origin": "its photos and those of the first epoch were adjusted in bundles of their own, which bend their clouds \
+                     differently: adjust the photos of all epochs in one bundle, which makes these errors several times smaller",
+            "ihre Fotos und die der ersten Epoche wurden getrennt ausgeglichen; die Punktwolken sind dadurch verschieden verbogen: die Fotos \
+            aller Epochen gemeinsam ausgleichen, das macht diese Fehler mehrfach kleiner";
+        NO_LENGTH = "scale": "no known length fixes the scale of both epochs: measure one in each and name it in [[distances]]",
+            "keine bekannte Länge legt den Maßstab beider Epochen fest: in jeder eine messen und in [[distances]] angeben";
         SPACING_VIEWS = "spacing": "{spacing} mm: in views of the cloud, nearly all stones at least {size} cm across are found, and some of the smaller ones",
             "{spacing} mm: in Ansichten der Punktwolke werden fast alle Steine ab {size} cm Breite gefunden, kleinere zum Teil";
         SPACING_WIDE = "spacing": "{spacing} mm: too wide to show the relief of single stones",
@@ -81,6 +95,8 @@ messages! {
         MASKS: "masks", "Masken";
         CAMERAS: "cameras against cloud", "Kameras gegen Punktwolke";
         EXTENT: "extent", "Ausdehnung";
+        ORIGIN: "points", "Punkte";
+        SCALE: "scale", "Maßstab";
         SPACING: "point spacing", "Punktabstand";
         UNITS: "units", "Einheiten";
         SYSTEM: "coordinate system", "Koordinatensystem";

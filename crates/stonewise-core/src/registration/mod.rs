@@ -7,6 +7,7 @@ pub(crate) mod adjustment;
 mod bulges;
 mod deformation;
 mod gicp;
+mod modes;
 mod moved;
 pub mod observers;
 mod octave_patches;

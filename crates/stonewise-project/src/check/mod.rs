@@ -8,6 +8,7 @@ mod edges;
 mod finding;
 mod likeness;
 mod masks;
+mod origin;
 mod page;
 mod photos;
 mod repeats;
@@ -89,6 +90,10 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
 
     report.findings.extend(unreadable.findings);
     report.findings.extend(clouds::look(project, &surveys));
+    // What cannot be read is named above.
+    report
+        .findings
+        .extend(origin::look(project, &surveys).unwrap_or_default());
     report.findings.extend(repeats::look(project, &surveys));
     report.findings.extend(stable::look(project, &surveys));
 

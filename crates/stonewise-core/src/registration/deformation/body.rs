@@ -1,15 +1,16 @@
 //! A part of the wall whose shape is judged: its stones, and the joint distribution of their motions.
 
-use super::shared_errors::SharedErrors;
+use super::shared_errors::{SharedErrors, symmetric_root};
 use crate::components::components;
 use crate::geometry::lever;
 use crate::id::StoneId;
 use crate::linalg::{BlockFactor, BlockPattern};
 use crate::registration::adjustment::JointMotions;
 use crate::registration::adjustment::joint_motions::JointStone;
+use crate::registration::modes::{less_rigid, main_modes};
 use crate::registration::observers::JointErrors;
 use crate::registration::octave_patches::octave_patches;
-use nalgebra::{Matrix3, Point3, SMatrix, Vector3};
+use nalgebra::{Matrix3, Matrix3xX, Point3, SMatrix, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -22,7 +23,13 @@ pub(super) struct Body<'a> {
     pub stones: Vec<BodyStone<'a>>,
     /// Pairs of neighbours, as indices into the stones.
     pub neighbours: Vec<[usize; 2]>,
+    /// All errors that stones share.
     pub shared: SharedErrors,
+    /// Those of points and of photos' poses alone.
+    pub of_points: SharedErrors,
+    /// The others, of the epochs: a column of each stone for each independent unknown of variance one, without what a
+    /// rigid motion of all stones explains.
+    pub of_epochs: Vec<Matrix3xX<f64>>,
 }
 
 /// A stone of it.
@@ -159,7 +166,22 @@ impl<'a> Body<'a> {
             shared.add_joint(&motions.poses, stones.iter().map(|s| s.joint.by_poses.clone()));
         }
 
+        let of_points = shared.clone();
+        let mut of_epochs = vec![Matrix3xX::zeros(0); stones.len()];
         if let Some((errors, _)) = errors {
+            let root = symmetric_root(&errors.covariance);
+            let column = |stone: &BodyStone| {
+                let mut by = Matrix3xX::zeros(root.ncols());
+                for (first, part) in error_of(stone.id).map_or(&[][..], |(e, k)| &e.rows[k]) {
+                    by += part * root.rows(*first, 3);
+                }
+                by
+            };
+            let columns = less_rigid(
+                stones.iter().map(|s| s.joint.place),
+                stones.iter().map(column).collect(),
+            );
+            of_epochs = columns.map_or(of_epochs, |columns| main_modes(&columns));
             let row = |stone: &BodyStone| {
                 let row = error_of(stone.id).map_or(&[][..], |(e, k)| &e.rows[k]);
                 let columns = |(first, by): &(usize, Matrix3<f64>)| {
@@ -176,6 +198,8 @@ impl<'a> Body<'a> {
             neighbours: motions.edges.iter().filter_map(pair).collect(),
             stones,
             shared,
+            of_points,
+            of_epochs,
         }
     }
 

@@ -2,17 +2,16 @@
 
 use super::body::Body;
 use crate::registration::bulges::RIM;
-use nalgebra::{Matrix3, Point3, Vector3, Vector6};
+use nalgebra::{DVector, Matrix3, Point3, Vector3};
 
 /// What the observations can show of a bulge's amplitude in one direction.
-#[derive(Clone, Copy)]
 pub(super) struct Direction {
     /// Standard deviation of the score.
     pub score_sd: f64,
     /// Information on the amplitude: the score of a bulge of one metre.
     pub information: f64,
-    /// Cross-information of the amplitude and the rigid motion.
-    pub with_rigid: Vector6<f64>,
+    /// Cross-information of the amplitude, and of the rigid motion and the errors of the epochs.
+    pub with_common: DVector<f64>,
 }
 
 impl Direction {
@@ -81,10 +80,12 @@ impl Bulge {
                 true => [-sum[k], -least[k]],
                 false => [sum[k], most[k]],
             };
-            self.directions[k].map_or_else(Score::default, |direction| Score {
-                whole: direction.standardised(sum),
-                without_largest: direction.standardised(sum - largest).max(0.0),
-            })
+            self.directions[k]
+                .as_ref()
+                .map_or_else(Score::default, |direction| Score {
+                    whole: direction.standardised(sum),
+                    without_largest: direction.standardised(sum - largest).max(0.0),
+                })
         })
     }
 
@@ -99,15 +100,15 @@ impl Bulge {
     /// observations, and of what they show beyond the motions. `None` where nothing shows it.
     pub fn most_likely(&self, left_over: &[Vec<Vector3<f64>>; 2]) -> Option<MostLikely> {
         let [score, smoothed] = left_over.each_ref().map(|rest| self.scores(rest));
-        let shown = |k: usize| Some((k, self.directions[k]?));
+        let shown = |k: usize| Some((k, self.directions[k].as_ref()?));
         let standardised = self.standardised(&left_over[0]);
-        let size = |(k, _): &(usize, Direction)| standardised[*k].without_largest;
+        let size = |(k, _): &(usize, &Direction)| standardised[*k].without_largest;
         let (number, direction) = (0..3)
             .filter_map(shown)
             .max_by(|a, b| size(a).total_cmp(&size(b)))?;
         let stones = self.stones.iter().filter(|(_, share)| *share > RIM);
         let missing = |k: usize| {
-            self.directions[k].map_or(0.0, |d| {
+            self.directions[k].as_ref().map_or(0.0, |d| {
                 d.amplitude_m(smoothed[k]).powi(2) + d.amplitude_sd_m().powi(2)
             })
         };

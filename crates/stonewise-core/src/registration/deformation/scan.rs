@@ -1,9 +1,10 @@
 //! Did the wall move as one rigid body? The most likely bulge of any place, size and direction, against none.
 //!
-//! A bulge b with amplitude a about a rigid motion: y_i = J_i r + a b_i + L_i u + e_i, where the stone's observations
-//! give y_i with information M_i and L_i u are errors that stones share. With r estimated by least squares, the score
-//! of the bulge is s = sum b_i' (v_i - M_i J_i r), linear in the observations; s^2 / var(s) is twice the log
-//! likelihood ratio of the bulge. The test statistic is the maximum over all bulges of (|s| - c) / sd(s), where c is the
+//! A bulge b with amplitude a about a rigid motion: y_i = J_i r + a b_i + E_i z + L_i u + e_i, where the stone's
+//! observations give y_i with information M_i, E_i z are errors of the epochs (z of variance one) and L_i u other errors
+//! that stones share. With r and z estimated by least squares, z with its prior (which whitens the observations: Aitken
+//! 1935), the score of the bulge is s = sum b_i' (v_i - M_i (J_i r + E_i z)), linear in the observations; s^2 / var(s)
+//! is twice the log likelihood ratio of the bulge where there is no u. The test statistic is the maximum over all bulges of (|s| - c) / sd(s), where c is the
 //! largest contribution of a stone: a bulge must also show in its other stones, so that no single stone is called a
 //! deformation of the wall. No variance is estimated under the alternative, so that nothing lies at a bound (compare
 //! Self & Liang 1987), and the maximum on a wall that moved as one body is simulated from the same model. Residuals are
@@ -18,7 +19,7 @@ use super::smoothed::smoothed;
 use crate::linalg::root;
 use crate::registration::bulges::{self, IN_FACE, OUT, Shape, shapes};
 use crate::statistics::upper_median;
-use nalgebra::{Const, Dyn, Matrix3, Matrix6, OMatrix, SMatrix, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, MatrixXx3, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -118,51 +119,66 @@ pub(super) fn scan(body: &Body) -> Option<Scan> {
     })
 }
 
-/// The rigid motion that all stones but loose ones share, by least squares.
+/// What all stones but loose ones have in common, by least squares: a rigid motion, and the errors of the epochs with
+/// their prior. What they explain of the observations is no bulge, and a bulge that they do not explain is found however
+/// large they are.
 struct Model<'a> {
     body: &'a Body<'a>,
     firm: &'a [usize],
-    /// Inverse of the information of the rigid motion.
-    inverse: Matrix6<f64>,
-    /// Unknowns of shared errors times what the rigid motion takes up of them.
-    of_shared: OMatrix<f64, Dyn, Const<6>>,
-    /// Variance that shared errors give to what the rigid motion takes up.
-    shared_of_rigid: Matrix6<f64>,
+    /// Displacement of each stone by what is common: six unknowns of the rigid motion, then errors of variance one.
+    by_common: Vec<Matrix3xX<f64>>,
+    /// Inverse of the information on what is common.
+    inverse: DMatrix<f64>,
+    /// Unknowns of the other shared errors times what the common part takes up of them.
+    of_shared: DMatrix<f64>,
+    /// Variance that these errors give to what the common part takes up.
+    shared_of_common: DMatrix<f64>,
     /// Inverse covariance of what the observations of each stone give.
     weights: Vec<Matrix3<f64>>,
 }
 
 impl<'a> Model<'a> {
     fn new(body: &'a Body, firm: &'a [usize]) -> Option<Self> {
-        let mut information = Matrix6::zeros();
-        let mut of_shared = body.shared.zeros::<6>();
+        let by_common = |(stone, of_epochs): (&BodyStone, &Matrix3xX<f64>)| {
+            let mut by = Matrix3xX::zeros(6 + of_epochs.ncols());
+            by.columns_mut(0, 6).copy_from(&stone.lever);
+            by.columns_mut(6, of_epochs.ncols()).copy_from(of_epochs);
+            by
+        };
+        let by_common: Vec<Matrix3xX<f64>> = body.stones.iter().zip(&body.of_epochs).map(by_common).collect();
+        let count = by_common.first()?.ncols();
+        let mut information = DMatrix::zeros(count, count);
+        (6..count).for_each(|k| information[(k, k)] = 1.0);
+        let mut of_shared = body.of_points.zero_columns(count);
         for &i in firm {
-            let stone = &body.stones[i];
-            let weighted = stone.information * stone.lever;
-            information += stone.lever.transpose() * weighted;
-            body.shared.add_transposed(i, &weighted, &mut of_shared);
+            let weighted = body.stones[i].information * &by_common[i];
+            information += by_common[i].transpose() * &weighted;
+            body.of_points.add_transposed(i, &weighted, &mut of_shared);
         }
         Some(Self {
             body,
             firm,
+            by_common,
             inverse: information.try_inverse()?,
-            shared_of_rigid: of_shared.transpose() * body.shared.spread(&of_shared),
+            shared_of_common: of_shared.transpose() * body.of_points.spread(&of_shared),
             of_shared,
             weights: (0..body.stones.len()).map(|i| weight(body, i)).collect(),
         })
     }
 
-    /// What the rigid motion leaves over of each stone, in its frame and up to the limit; the motion is found with what
-    /// counts.
+    /// What the common part leaves over of each stone, in its frame and up to the limit; the common part is found with
+    /// what counts.
     fn left_over(&self, vectors: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-        let mut rigid = Vector6::zeros();
+        let mut common: DVector<f64> = DVector::zeros(self.inverse.nrows());
         let mut rest = vec![Vector3::zeros(); vectors.len()];
         for round in 0..ROUNDS {
             let mut any_limited = false;
-            let mut right = Vector6::zeros();
+            let mut right = DVector::zeros(common.len());
+            // The prior of the errors pulls them towards zero.
+            (6..common.len()).for_each(|k| right[k] = -common[k]);
             for &i in self.firm {
                 let stone = &self.body.stones[i];
-                let residual = vectors[i] - stone.information * (stone.lever * rigid);
+                let residual = vectors[i] - stone.information * (&self.by_common[i] * &common);
                 let deviations = residual.dot(&(self.weights[i] * residual)).max(0.0).sqrt();
                 // The first round finds the motion of all.
                 let is_limited = round > 0 && deviations > LARGEST_RESIDUAL;
@@ -171,12 +187,12 @@ impl<'a> Model<'a> {
                     true => residual * (LARGEST_RESIDUAL / deviations),
                     false => residual,
                 };
-                right += stone.lever.transpose() * rest[i];
+                right.gemv_tr(1.0, &self.by_common[i], &rest[i], 1.0);
             }
             if round > 0 && !any_limited {
                 break;
             }
-            rigid += self.inverse * right;
+            common += &self.inverse * right;
         }
         for &i in self.firm {
             rest[i] = self.body.stones[i].joint.face_from_world * rest[i];
@@ -186,31 +202,32 @@ impl<'a> Model<'a> {
 
     /// What the observations can show in each direction of a bulge of these stones.
     fn directions(&self, stones: &[(usize, f64)]) -> [Option<Direction>; 3] {
-        let (mut plain, mut with_rigid) = (Matrix3::zeros(), SMatrix::<f64, 6, 3>::zeros());
-        let mut of_shared = self.body.shared.zeros::<3>();
+        let mut plain = Matrix3::zeros();
+        let mut with_common = MatrixXx3::zeros(self.inverse.nrows());
+        let mut of_shared = self.body.of_points.zeros::<3>();
         for (i, share) in stones {
             let stone = &self.body.stones[*i];
             let moved = stone.joint.face_from_world.transpose() * *share;
             let weighted = stone.information * moved;
             plain += moved.transpose() * weighted;
-            with_rigid += stone.lever.transpose() * weighted;
-            self.body.shared.add_transposed(*i, &weighted, &mut of_shared);
+            with_common += self.by_common[*i].transpose() * weighted;
+            self.body.of_points.add_transposed(*i, &weighted, &mut of_shared);
         }
-        let explained = self.inverse * with_rigid;
-        let information = plain - with_rigid.transpose() * explained;
-        // The covariance of the unknowns' part less what the rigid motion takes up, term by term: few unknowns act on
-        // the stones of a small bulge, all on the rigid motion.
-        let spread = self.body.shared.spread(&of_shared);
-        let both = spread.transpose() * &self.of_shared * explained;
-        let shared = of_shared.transpose() * spread - both - both.transpose()
-            + explained.transpose() * self.shared_of_rigid * explained;
+        let explained = &self.inverse * &with_common;
+        let information = plain - with_common.transpose() * &explained;
+        // The covariance of the unknowns' part less what the common part takes up, term by term: few unknowns act on
+        // the stones of a small bulge, all on the common part.
+        let spread = self.body.of_points.spread(&of_shared);
+        let both = spread.transpose() * &self.of_shared * &explained;
+        let shared = of_shared.transpose() * spread - &both - both.transpose()
+            + explained.transpose() * &self.shared_of_common * &explained;
         std::array::from_fn(|k| {
             let left = information[(k, k)];
             let variance = left + shared[(k, k)];
             (left > LEAST_SHARE * plain[(k, k)] && variance > 0.0).then(|| Direction {
                 score_sd: variance.sqrt(),
                 information: left,
-                with_rigid: with_rigid.column(k).into_owned(),
+                with_common: with_common.column(k).into_owned(),
             })
         })
     }
@@ -241,7 +258,8 @@ impl<'a> Model<'a> {
     /// The amplitude of `moved` that raises the score of `scored`, without its largest stone, above `limit` in 95 of 100
     /// cases; `None` where no amplitude does.
     fn found_from_m(&self, moved: &Bulge, scored: &Bulge, direction: usize, limit: f64) -> Option<f64> {
-        let (by_moved, by_scored) = (moved.directions[direction]?, scored.directions[direction]?);
+        let by_moved = moved.directions[direction].as_ref()?;
+        let by_scored = scored.directions[direction].as_ref()?;
         let (mut sum, mut largest, mut variance) = (0.0, 0.0, 0.0);
         for (i, share) in &moved.stones {
             let stone = &self.body.stones[*i];
@@ -254,7 +272,10 @@ impl<'a> Model<'a> {
                 (largest, variance) = (added, of_scored * of_scored * information);
             }
         }
-        let of_one_metre = sum - by_scored.with_rigid.dot(&(self.inverse * by_moved.with_rigid)) - largest;
+        let explained = by_scored
+            .with_common
+            .dot(&(&self.inverse * &by_moved.with_common));
+        let of_one_metre = sum - explained - largest;
         // The errors of the stone that is left out do not count either.
         let sd = (by_scored.score_sd.powi(2) - variance).max(0.0).sqrt();
         (of_one_metre > 0.0).then(|| (limit * by_scored.score_sd + POWER * sd) / of_one_metre)

@@ -2,9 +2,11 @@
 //! stone.
 
 use super::random::Random;
-use nalgebra::{DMatrix, DVector, Dyn, Matrix3, OMatrix, Vector3};
+use nalgebra::allocator::Allocator;
+use nalgebra::{DMatrix, DVector, DefaultAllocator, Dim, Dyn, Matrix3, OMatrix, U1, U3, Vector3};
 
 /// Errors of the stones as linear functions of unknowns that are normal about zero: e_i = L_i u.
+#[derive(Clone)]
 pub(super) struct SharedErrors {
     /// Unknowns of each stone, and its displacement by each of them, metres a unit.
     rows: Vec<Vec<(usize, Vector3<f64>)>>,
@@ -14,6 +16,7 @@ pub(super) struct SharedErrors {
 }
 
 /// Distribution of a group of unknowns.
+#[derive(Clone)]
 enum Spread {
     /// So many independent ones of variance one.
     Unit(usize),
@@ -44,9 +47,7 @@ impl SharedErrors {
         rows: impl Iterator<Item = Vec<(usize, Vector3<f64>)>>,
     ) {
         self.add_rows(rows);
-        let eigen = (0.5 * (covariance + covariance.transpose())).symmetric_eigen();
-        let roots = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
-        let root = eigen.eigenvectors * DMatrix::from_diagonal(&roots);
+        let root = symmetric_root(covariance);
         let count = covariance.nrows();
         self.groups
             .push((self.unknowns, Spread::Joint(&root * root.transpose(), root)));
@@ -61,12 +62,10 @@ impl SharedErrors {
     }
 
     /// L_i' times a column for each displacement of the stone, added to `to`.
-    pub fn add_transposed<const C: usize>(
-        &self,
-        stone: usize,
-        x: &nalgebra::SMatrix<f64, 3, C>,
-        to: &mut OMatrix<f64, Dyn, nalgebra::Const<C>>,
-    ) {
+    pub fn add_transposed<C: Dim>(&self, stone: usize, x: &OMatrix<f64, U3, C>, to: &mut OMatrix<f64, Dyn, C>)
+    where
+        DefaultAllocator: Allocator<U3, C> + Allocator<Dyn, C> + Allocator<U1, C>,
+    {
         for (k, by) in &self.rows[stone] {
             let mut row = to.row_mut(*k);
             row += by.transpose() * x;
@@ -90,11 +89,16 @@ impl SharedErrors {
         OMatrix::<f64, Dyn, nalgebra::Const<C>>::zeros(self.unknowns)
     }
 
+    /// As many columns of zeros.
+    pub fn zero_columns(&self, count: usize) -> DMatrix<f64> {
+        DMatrix::zeros(self.unknowns, count)
+    }
+
     /// The covariance of the unknowns times these columns; rows of zeros cost nothing.
-    pub fn spread<const C: usize>(
-        &self,
-        x: &OMatrix<f64, Dyn, nalgebra::Const<C>>,
-    ) -> OMatrix<f64, Dyn, nalgebra::Const<C>> {
+    pub fn spread<C: Dim>(&self, x: &OMatrix<f64, Dyn, C>) -> OMatrix<f64, Dyn, C>
+    where
+        DefaultAllocator: Allocator<Dyn, C> + Allocator<U1, C> + Allocator<C, U1>,
+    {
         let mut out = x.clone();
         for (first, spread) in &self.groups {
             if let Spread::Joint(covariance, _) = spread {
@@ -152,4 +156,11 @@ impl SharedErrors {
         }
         u
     }
+}
+
+/// A root of a covariance, one column for each of its eigenvectors.
+pub(super) fn symmetric_root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let eigen = (0.5 * (covariance + covariance.transpose())).symmetric_eigen();
+    let roots = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+    eigen.eigenvectors * DMatrix::from_diagonal(&roots)
 }

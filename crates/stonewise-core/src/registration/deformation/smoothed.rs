@@ -39,7 +39,7 @@ pub(super) fn smoothed(body: &Body, bulges: &[Bulge], beyond: &[Vector3<f64>]) -
     let of_bulge = |bulge: &Bulge| {
         let scores = bulge.scores(beyond);
         let missing = |k: usize| {
-            let direction = bulge.directions[k]?;
+            let direction = bulge.directions[k].as_ref()?;
             Some(Missing::new(
                 direction.standardised(scores[k]),
                 direction.amplitude_sd_m(),

@@ -14,6 +14,7 @@ use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::{Observation, in_face};
 use super::relative::relative_errors;
 use super::rigid::{RigidError, difference_row, neighbour_row, rigid_rows, shares};
+use super::scale::ScaleError;
 use super::sensors::Sharpest;
 use super::sight::{SeenStone, Sight, Source};
 use super::stable::stable_observations;
@@ -104,6 +105,13 @@ pub struct EpochErrors {
     /// the order of [`EpochPair::neighbours`]; where the datum is unknown, without the rigid motion.
     #[serde(skip)]
     pub between: Vec<Matrix3<f64>>,
+    /// The scale of the later epoch; `None` where it is exact. Its expectation is in `at`.
+    #[serde(default)]
+    pub scale: Option<ScaleError>,
+    /// Covariance that the scale and the photos' interior orientation give the error at each stone, in their order,
+    /// which is part of the others; world, m^2.
+    #[serde(default)]
+    pub shared: Vec<Matrix3<f64>>,
     /// The error at all stones together; `None` where the numbers fail.
     #[serde(skip)]
     pub joint: Option<JointErrors>,
@@ -138,10 +146,13 @@ pub fn epoch_errors(
     params: &EpochErrorParams,
     progress: &dyn Progress,
 ) -> Result<EpochErrors, Interrupted> {
-    match Sharpest::of(pair) {
+    let mut errors = match Sharpest::of(pair) {
         Some(sharpest) => of_sources(&sharpest.pair(pair), params, progress),
         None => of_sources(pair, params, progress),
-    }
+    }?;
+    progress.check()?;
+    errors.add_shared(pair);
+    Ok(errors)
 }
 
 /// Errors of the epochs from sources that are all used.
@@ -255,6 +266,8 @@ fn of_sources(
         merged_error_m,
         relative,
         between,
+        scale: None,
+        shared: Vec::new(),
         joint,
     })
 }

@@ -1,8 +1,10 @@
 //! Input of the comparison of two epochs: sources, stones, surfaces and parameters.
 
 use super::contrast::ContrastParams;
+use super::network::PhotoNetwork;
 use super::observation::Observation;
 use super::response::Response;
+use super::scale::KnownScale;
 use super::sight::{SeenStone, Sight, Source, Target};
 use super::stable::{StableParams, StablePoints};
 use crate::params::{Params, Range, Ranged, with_ranges};
@@ -61,6 +63,10 @@ pub struct EpochPair<'a> {
     /// Whether the later epoch was brought to the reference by the stones themselves: its sources then say nothing of the
     /// datum.
     pub is_aligned: bool,
+    /// The photos from which clouds were computed, where they were.
+    pub network: Option<&'a PhotoNetwork>,
+    /// What is known of the epochs' scale; `None`: it is exact.
+    pub scale: Option<KnownScale>,
 }
 
 impl<'a> EpochPair<'a> {
@@ -75,6 +81,8 @@ impl<'a> EpochPair<'a> {
             sigma_m,
             response: None,
             is_aligned: false,
+            network: None,
+            scale: None,
         }
     }
 }

@@ -77,6 +77,8 @@ impl Sharpest {
             sigma_m: of.sigma_m,
             response: of.response,
             is_aligned: of.is_aligned,
+            network: of.network,
+            scale: of.scale,
         }
     }
 }

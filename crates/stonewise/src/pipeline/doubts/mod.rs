@@ -72,7 +72,7 @@ fn note_doubts(run: &Run, later: EpochId) -> Result<()> {
         // A prescribed motion moves all points, those off the wall too, which would otherwise show a wrong
         // registration or scale.
         true => [None, None],
-        false => [misregistered(context, &registered), stretched(rows, datum)],
+        false => [misregistered(context, &registered), stretched(&registered)],
     };
     for message in of_motions.into_iter().chain(of_epochs).flatten() {
         context.warnings.doubt("register", &epochs.later.name, message);

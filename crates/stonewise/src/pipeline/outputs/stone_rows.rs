@@ -33,6 +33,13 @@ pub fn stone_rows(
     let deformed: BTreeMap<_, _> = deformed.map(|s| (s.stone, s)).collect();
     let relative = registered.relative_errors();
 
+    let by_scale = |stone: &Stone| {
+        let scale = registered.epoch_errors.as_ref().and_then(|e| e.scale.as_ref());
+        scale.map_or_else(Vector3::zeros, |scale| scale.at(&stone.centroid))
+    };
+    let shared = registered.shared_errors();
+    let shared = |stone: &Stone| shared.get(&stone.id).map_or_else(Matrix3::zeros, |s| **s);
+
     // Stones turn with the rigid part of the error; how its drifts turn single stones is not estimated.
     let turn = registered.epoch_errors.as_ref();
     let turn: Vector3<f64> =
@@ -48,16 +55,19 @@ pub fn stone_rows(
             (Some(covariance), Some(rotation_covariance)) => {
                 let error = errors.get(&stone.id);
                 Reference {
-                    error: error.map_or_else(Vector3::zeros, |e| e.mean),
+                    error: error.map_or_else(|| by_scale(stone), |e| e.mean),
                     turn: error.map_or_else(Vector3::zeros, |_| turn),
                     motion: Vector3::zeros(),
-                    covariance: error.map_or(covariance, |e| e.covariance),
+                    covariance: error.map_or_else(|| covariance + shared(stone), |e| e.covariance),
                     rotation_covariance,
                 }
             }
             _ => {
                 let relative = relative.get(&stone.id).map_or_else(Matrix3::zeros, |r| **r);
-                Reference::against(common.as_ref(), stone, &relative)
+                Reference {
+                    error: by_scale(stone),
+                    ..Reference::against(common.as_ref(), stone, &relative)
+                }
             }
         };
         let pair = motions.get(&stone.id).copied();

@@ -1,27 +1,33 @@
 //! The error that all motions of an epoch share, as its sources and areas off the wall show it.
 
 use super::datum::is_one_survey;
+use super::network::photo_network;
 use super::off_wall::OffWall;
 use super::registered::{Registered, STEP};
+use super::scale::known_scale;
 use super::sights::Sights;
+use super::tracked;
 use crate::error::Result;
-use crate::pipeline::context::Context;
+use crate::pipeline::graph::Run;
 use crate::pipeline::steps::label::Labelled;
+use crate::storage::step::StepDir;
 use crate::texts::notices::TOO_MANY_SOURCES;
 use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::id::StoneId;
 use stonewise_core::registration::JointMotions;
 use stonewise_core::registration::observers::{EpochErrorParams, EpochPair, Response, epoch_errors};
 
-/// Estimates that error, and adds it to the covariances of neighbours. `joint`: the last solution of the adjustment.
+/// Estimates that error, and adds it to the covariances of neighbours. `step`: folder of what photos show; `joint`: the last
+/// solution of the adjustment.
 pub(super) fn add_epoch_error(
-    context: &Context,
+    run: &Run,
     epochs: Pair<EpochId>,
     labelled: Pair<&Labelled>,
     matches: &[(StoneId, StoneId)],
     registered: &mut Registered,
-    joint: Option<&JointMotions>,
+    (step, joint): (&StepDir, Option<&JointMotions>),
 ) -> Result<()> {
+    let context = run.context;
     let project = context.project;
     let params = &project.settings.registration;
     let is_known =
@@ -41,6 +47,8 @@ pub(super) fn add_epoch_error(
     }
 
     let neighbours = registered.neighbours_among(&sights.stones);
+    let tracks = tracked::read(step.path())?;
+    let network = photo_network(run, epochs, (&sights.stones, &sights.seen), tracks.as_ref())?;
     let pair = EpochPair {
         sources: &sights.sources,
         stones: &sights.seen,
@@ -53,6 +61,8 @@ pub(super) fn add_epoch_error(
             stones: &sights.stones,
         }),
         is_aligned: project.is_aligned(epochs.later),
+        network: network.as_ref(),
+        scale: known_scale(project, epochs, labelled, network.as_ref(), registered.noise_m())?,
     };
 
     let observers = EpochErrorParams {

@@ -4,11 +4,13 @@ mod datum;
 mod epoch_error;
 mod estimate;
 mod mean_motion;
+mod network;
 mod notices;
 mod off_wall;
 mod pairs;
 mod photos;
 mod registered;
+mod scale;
 mod sights;
 mod tracked;
 mod windows;
@@ -103,12 +105,12 @@ fn register(
         |step, warnings| {
             let (mut registered, joint) = estimate(run, epochs, labelled, matches, step, warnings)?;
             add_epoch_error(
-                run.context,
+                run,
                 epochs,
                 labelled,
                 matches,
                 &mut registered,
-                joint.as_ref(),
+                (step, joint.as_ref()),
             )?;
             if let Some(joint) = joint {
                 let errors = registered.epoch_errors.as_ref().and_then(|e| e.joint.as_ref());
@@ -147,7 +149,19 @@ fn key(
     }
     let same_survey = project.epochs[epochs.later].same_survey_as;
     let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
-    Ok(Key::new(STEP, &(params, matches, same_survey), &inputs))
+    let origins = epochs.map(|e| {
+        let epoch = &project.epochs[e];
+        (epoch.origin, epoch.bundle.clone())
+    });
+    let distances = project
+        .distances
+        .iter()
+        .filter(|d| epochs.into_array().contains(&d.epoch));
+    let distances: Vec<String> = distances
+        .map(|d| format!("{:?}", (d.epoch, d.ends, d.length_m, d.sd_m)))
+        .collect();
+    let stated = (origins.into_array(), distances);
+    Ok(Key::new(STEP, &(params, matches, same_survey, stated), &inputs))
 }
 
 /// Removes the motions of carried stones that moved against their neighbours by more than this, metres. A

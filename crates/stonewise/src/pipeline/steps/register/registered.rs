@@ -61,6 +61,12 @@ impl Registered {
         self.error_stones.iter().copied().zip(errors).collect()
     }
 
+    /// Covariance that the scale and the photos' interior orientation give that error, by stone of the reference.
+    pub fn shared_errors(&self) -> BTreeMap<StoneId, &Matrix3<f64>> {
+        let errors = self.epoch_errors.iter().flat_map(|e| &e.shared);
+        self.error_stones.iter().copied().zip(errors).collect()
+    }
+
     /// The pairs of neighbours as indices into `stones`. Pairs with other stones are removed, also from the
     /// results.
     pub(super) fn neighbours_among(&mut self, stones: &[StoneId]) -> Vec<[usize; 2]> {

@@ -1,0 +1,87 @@
+//! The scale of the later epoch against the reference.
+//!
+//! A scale is a stretch of all places away from their middle. Only known lengths show it: between the epochs it looks like
+//! a wall that grew. So it is taken off as far as lengths are known, its uncertainty is an error that all stones share,
+//! and a wall that seems to grow all round by more than instruments and temperature explain leaves it open.
+
+use super::epoch_pair::EpochPair;
+use crate::geometry::Strain;
+use nalgebra::{Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Strain that temperature gives a wall in every direction: at most 12e-6 per kelvin for masonry (EN 1996-1-1:2005,
+/// 3.7.4), and 25 K.
+const THERMAL_STRAIN: f64 = 3e-4;
+/// Half width of a 95 % interval of a strain, in standard deviations: Student's law with the eight degrees of
+/// freedom of [`Strain`]'s nine parts.
+const STRAIN_SIGMAS_95: f64 = 2.306;
+
+/// What is known of the scale before the epochs are compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KnownScale {
+    /// Length in the later epoch over length in the reference, less one: its expectation.
+    pub mean: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+    /// Whether known lengths show it.
+    pub is_measured: bool,
+}
+
+/// The scale error of the later epoch against the reference.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ScaleError {
+    /// Middle of the stones, about which it stretches, world, metres.
+    pub centre: Point3<f64>,
+    /// Its expectation, which is taken off.
+    pub mean: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+    /// Mean strain of the wall and its 95 % half width, and the lesser principal strain, where they are beyond what
+    /// instruments and temperature explain.
+    pub strain: Option<[f64; 3]>,
+}
+
+impl ScaleError {
+    pub(super) fn of(known: KnownScale, pair: &EpochPair) -> Self {
+        let count = pair.stones.len().max(1) as f64;
+        let centre = Point3::from(
+            pair.stones
+                .iter()
+                .map(|s| s.centroid.coords)
+                .sum::<Vector3<f64>>()
+                / count,
+        );
+        let strain = strain(&known, pair).filter(|_| !known.is_measured);
+        Self {
+            centre,
+            mean: known.mean,
+            sd: strain.map_or(known.sd, |[mean, _, _]| known.sd.hypot(mean)),
+            strain,
+        }
+    }
+
+    /// Displacement of a place by a scale error of one, metres.
+    pub(super) fn arm(&self, place: &Point3<f64>) -> Vector3<f64> {
+        place - self.centre
+    }
+
+    /// The expected error at a place, world, metres.
+    pub fn at(&self, place: &Point3<f64>) -> Vector3<f64> {
+        self.arm(place) * self.mean
+    }
+}
+
+/// The strain of the stones that are not loose, if the wall grew or shrank all round by more than the scale and
+/// temperature explain.
+fn strain(known: &KnownScale, pair: &EpochPair) -> Option<[f64; 3]> {
+    let stones = pair.response?.motions.stones.iter().flatten();
+    let (places, displacements): (Vec<_>, Vec<_>) = stones
+        .filter(|s| !s.is_loose)
+        .map(|s| (s.place, s.displacement))
+        .unzip();
+    let strain = Strain::fit(&places, &displacements)?;
+    let sign = strain.mean.signum();
+    let least = sign * strain.lesser - STRAIN_SIGMAS_95 * strain.lesser_sd;
+    let half_width = STRAIN_SIGMAS_95 * strain.mean_sd;
+    (least > THERMAL_STRAIN + STRAIN_SIGMAS_95 * known.sd).then_some([strain.mean, half_width, strain.lesser])
+}
