@@ -20,9 +20,13 @@ use stonewise_segment::tiling::TilingOptions;
 /// How stones are found in photos without masks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>)]
 pub struct SegmentParams {
     /// The detector: `built-in`, or a file that `stonewise train` wrote.
     pub model: PathBuf,
+    /// Photos that are to show each part of the wall, among which the detector's are chosen (`photos = "auto"`
+    /// of an epoch).
+    pub photos_per_place: u32,
     /// How photos are cut into tiles.
     pub tiling: TilingOptions,
 }
@@ -31,12 +35,17 @@ impl Default for SegmentParams {
     fn default() -> Self {
         Self {
             model: PathBuf::from("built-in"),
+            photos_per_place: 4,
             tiling: TilingOptions::default(),
         }
     }
 }
 
 impl Params for SegmentParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![Range::between(1.0, f64::INFINITY).holds("photos_per_place", self.photos_per_place)]
+    }
+
     fn parts(&self) -> Vec<(&'static str, &dyn Params)> {
         vec![("tiling", &self.tiling)]
     }

@@ -1,6 +1,6 @@
 //! How a project file is read and checked.
 
-use super::{Epoch, PhotoFiles, Project};
+use super::{Epoch, PhotoChoice, PhotoFiles, Project};
 use crate::conditions::ConditionsFile;
 use crate::distances::{RawDistances, distances, read_raw};
 use crate::edits::EditsFile;
@@ -212,6 +212,9 @@ struct RawEpoch {
     /// Cameras: Metashape XML, COLMAP folder, RealityCapture CSV and others.
     #[schemars(with = "Option<PathBuf>")]
     cameras: Option<Spanned<PathBuf>>,
+    /// In which photos the detector looks for stones, where there are no masks.
+    #[serde(default)]
+    photos: PhotoChoice,
     /// Masks of the stones: COCO json, or a folder of 16-bit label PNGs. Absent: the detector finds them.
     #[schemars(with = "Option<PathBuf>")]
     masks: Option<Spanned<PathBuf>>,
@@ -431,6 +434,7 @@ impl Source<'_> {
             conditions: raw.conditions,
             clouds,
             photos,
+            photo_choice: raw.photos,
             masks: raw.masks.map(|m| self.existing(m)).transpose()?,
             motion: raw.motion,
             map: map.clone(),
@@ -849,6 +853,20 @@ mod tests {
         let both = read("images = \".\"\ncameras = \"cameras.xml\"").unwrap();
         let has_photos: Vec<bool> = both.epochs.iter().map(|e| e.photos.is_some()).collect();
         assert_eq!(has_photos, [true, false]);
+        // Photos are chosen where there are some without masks, unless all are wanted.
+        let files = "images = \".\"\ncameras = \"cameras.xml\"\n";
+        for (keys, chooses) in [
+            ("", true),
+            ("photos = \"auto\"", true),
+            ("photos = \"all\"", false),
+            ("masks = \"masks.json\"", false),
+        ] {
+            let project = read(&format!("{files}{keys}")).unwrap();
+            let found: Vec<bool> = project.epochs.ids().map(|e| project.chooses_photos(e)).collect();
+            assert_eq!(found, [chooses, false], "{keys}");
+        }
+        let message = read(&format!("{files}photos = \"few\"")).unwrap_err();
+        assert!(message.contains("stonewise.toml:8: "), "{message}");
         let without = &both.epochs.iter().last().unwrap();
         assert!(without.read_cameras().unwrap().views.is_empty());
         for (keys, fix) in [

@@ -6,6 +6,8 @@ use crate::edits::EditsFile;
 use crate::instruments::InstrumentFile;
 use crate::origin::Origin;
 use crate::sources::SourceRule;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::Result;
@@ -59,6 +61,8 @@ pub struct Epoch {
     pub clouds: Vec<PathBuf>,
     /// Photos; where there are none, views of the clouds take their place.
     pub photos: Option<PhotoFiles>,
+    /// In which photos stones are sought, where there are no masks.
+    pub photo_choice: PhotoChoice,
     /// COCO json or folder of label PNGs.
     pub masks: Option<PathBuf>,
     /// Known motion of the points, applied after labelling.
@@ -74,6 +78,17 @@ pub struct Epoch {
     pub bundle: Option<String>,
     /// What the project file says about where the clouds lie on the map.
     pub map: MapFrame,
+}
+
+/// In which photos of an epoch without masks stones are sought.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PhotoChoice {
+    /// In as many as the votes need (`[segment] photos_per_place`), at the scale that their stones need.
+    #[default]
+    Auto,
+    /// In all of them, as they are.
+    All,
 }
 
 /// Photos with their cameras.
@@ -153,6 +168,12 @@ impl Project {
         !epoch.is_reference() && self.settings.registration.align == Align::Stones
     }
 
+    /// Whether the photos are chosen in which the detector looks for stones of an epoch.
+    pub fn chooses_photos(&self, epoch: EpochId) -> bool {
+        let own = &self.epochs[epoch];
+        own.masks.is_none() && own.photos.is_some() && own.photo_choice == PhotoChoice::Auto
+    }
+
     /// Whether the detector looks at views of the clouds of an epoch: in place of photos, or beside them with
     /// `beside_photos`.
     pub fn has_views(&self, epoch: EpochId) -> bool {
@@ -168,6 +189,7 @@ impl Project {
             conditions: BTreeMap::new(),
             clouds: vec![cloud.to_path_buf()],
             photos: None,
+            photo_choice: PhotoChoice::default(),
             masks: None,
             motion: None,
             sources: SourceRule::default(),

@@ -51,8 +51,12 @@ impl Detector {
     ) -> PyResult<Found<'py>> {
         let photo = photo(&image).ok_or_else(|| error("an image of shape (height, width, 3) is needed"))?;
         let found = attended(py, &Listeners::progress(progress), |progress| {
-            progress.begin("stones", self.tiling.tile_count(photo.width(), photo.height()));
-            segment_photo(&self.finder, &photo, None, &self.tiling, progress).map_err(stonewise::Error::from)
+            progress.begin(
+                "stones",
+                self.tiling.tile_count(photo.width(), photo.height(), 1.0),
+            );
+            segment_photo(&self.finder, &photo, 1.0, None, &self.tiling, progress)
+                .map_err(stonewise::Error::from)
         })?;
         arrays(py, found.map_err(explained)?)
     }

@@ -100,7 +100,7 @@ fn epochs(run: &RunRecord, later: &[EpochVerdict]) -> Result<Table, TableError> 
     }
     let points: Vec<f64> = run.epochs.iter().map(|e| e.points as f64).collect();
     table.push("points", "", "points of the clouds", points)?;
-    let photos: Vec<u32> = run.epochs.iter().map(|e| e.photos as u32).collect();
+    let photos: Vec<u32> = run.epochs.iter().map(|e| e.photo_count as u32).collect();
     table.push("photos", "", "photos, or views of the clouds", photos)?;
     let datum = |i: usize| {
         run.datum

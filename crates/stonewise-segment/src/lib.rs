@@ -12,7 +12,7 @@
 //! let options = TilingOptions::default();
 //! let finder = StoneFinder::open(&Weights::BuiltIn, options.min_score as f32)?;
 //! let photo = masonry_photo(9_001, 320, 320);
-//! let found = segment_photo(&finder, photo.image(), None, &options, &Silent)?;
+//! let found = segment_photo(&finder, photo.image(), 1.0, None, &options, &Silent)?;
 //! // `labels` has the stone of every pixel, 0 for none.
 //! println!("{} stones; the pixel in the corner shows stone {}", found.scores.len(), found.labels.data()[0]);
 //! # assert!(found.scores.len() > 3);

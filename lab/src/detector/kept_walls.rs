@@ -127,7 +127,7 @@ fn score(
     options: &TilingOptions,
     table: &mut BTreeMap<(usize, usize), Score>,
 ) {
-    let found = segment_photo(detector, wall.image(), wall.relief(), options, &Silent);
+    let found = segment_photo(detector, wall.image(), 1.0, wall.relief(), options, &Silent);
     let found = found.expect("the detector takes every wall");
     let pairs = pair_masks(&found, wall.labels(), wall.ignore());
     let own = stones(wall.labels(), wall.image());

@@ -54,8 +54,8 @@ pub fn run(words: &Words) -> Outcome {
                 min_score: 0.05,
                 ..TilingOptions::whole(sample.image())
             };
-            let found =
-                segment_photo(&detector, sample.image(), None, &options, &Silent).expect("nothing stops it");
+            let found = segment_photo(&detector, sample.image(), 1.0, None, &options, &Silent)
+                .expect("nothing stops it");
             pair_masks(&found, sample.labels(), sample.ignore())
         })
         .collect();

@@ -50,6 +50,20 @@ messages! {
             "stones are looked for in {n} views of the cloud's relief, shaded",
             "Steine werden in {n} Ansichten des schattierten Reliefs der Punktwolke gesucht";
 
+        PHOTOS_CHOSEN = "photos-chosen":
+            "stones are looked for in {n} of {all} photos, at {scales} of their size: {each} photos show each part of the wall, or as many as \
+            there are; {stones}",
+            "Steine werden in {n} von {all} Fotos gesucht, bei {scales} ihrer Größe: jeden Teil der Mauer zeigen {each} Fotos oder alle, die \
+            es gibt; {stones}";
+
+        SIZE_OF_STONES:
+            "three quarters of the stones of a first look are larger than {size} m",
+            "drei Viertel der Steine eines ersten Blicks sind größer als {size} m";
+
+        SIZE_UNKNOWN:
+            "a first look shows too few stones to tell how large they are",
+            "ein erster Blick zeigt zu wenige Steine, um ihre Größe zu bestimmen";
+
         AUTO_STABLE = "auto-stable":
             "auto_stable: areas off the wall ({count} found) are taken for stable, as far as they agree with each other",
             "auto_stable: Flächen neben der Mauer ({count} gefunden) gelten als stabil, soweit sie miteinander übereinstimmen";

@@ -46,13 +46,15 @@ impl<'a> Nearest<'a> {
 
     /// Part of some cells that the camera sees.
     pub(super) fn seen_share(&self, cells: &[&SurfaceCell]) -> f64 {
-        let is_seen = |cell: &&&SurfaceCell| {
-            self.place(cell).is_some_and(|(at, depth_m)| {
-                let nearest = self.depths.get(&at.map(floor)).copied().unwrap_or(f64::INFINITY);
-                depth_m <= nearest + BEHIND_CELLS * self.cell_m
-            })
-        };
-        cells.iter().filter(is_seen).count() as f64 / cells.len().max(1) as f64
+        cells.iter().filter(|cell| self.sees(cell)).count() as f64 / cells.len().max(1) as f64
+    }
+
+    /// Whether the camera sees a cell.
+    pub(super) fn sees(&self, cell: &SurfaceCell) -> bool {
+        self.place(cell).is_some_and(|(at, depth_m)| {
+            let nearest = self.depths.get(&at.map(floor)).copied().unwrap_or(f64::INFINITY);
+            depth_m <= nearest + BEHIND_CELLS * self.cell_m
+        })
     }
 
     /// Direction, in units of the keys, and depth of a cell.

@@ -88,7 +88,7 @@ fn time(project: &Project, points: u64, photos: &[[u32; 2]], tile: f64) -> Strin
     tiling.scales.retain(|scale| *scale <= 1.0);
     let tiles: u64 = photos
         .iter()
-        .map(|[width, height]| tiling.tile_count(*width, *height))
+        .map(|[width, height]| tiling.tile_count(*width, *height, 1.0))
         .sum();
     let seconds = tile * (of_points / SECONDS_PER_TILE + tiles as f64) / cores as f64;
     let views = match project.epochs.ids().any(|e| project.has_views(e)) {

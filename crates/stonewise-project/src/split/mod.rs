@@ -5,7 +5,7 @@ mod halves_edits;
 mod photos;
 
 use crate::init::quoted;
-use crate::{Epoch, Project};
+use crate::{Epoch, PhotoChoice, Project};
 use half::{half_folder, half_name};
 use halves_edits::halves_edits;
 use photos::{copy_photos, shuffled_photos};
@@ -119,6 +119,9 @@ fn epoch_table(epoch: &Epoch, half: usize, clouds: &[String]) -> Result<String> 
     if let Some(files) = &epoch.photos {
         let (folder, cameras) = (half_folder(half), absolute(&files.cameras)?);
         let _ = writeln!(text, "images = \"{folder}/images\"\ncameras = {cameras}");
+    }
+    if epoch.photo_choice == PhotoChoice::All {
+        text.push_str("photos = \"all\"\n");
     }
     if let Some(masks) = &epoch.masks {
         let _ = writeln!(text, "masks = {}", absolute(masks)?);

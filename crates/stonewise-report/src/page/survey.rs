@@ -38,7 +38,7 @@ pub(super) fn survey(results: &ResultSet, texts: &Texts) -> String {
             let views = || names.views.to_owned();
             e.cameras.as_ref().map_or_else(views, |c| file(c, texts))
         }),
-        row(names.photos, &|e| count(e.photos)),
+        row(names.photos, &|e| count(e.photo_count)),
         row(names.masks, &|e| {
             let detector = || names.detector.to_owned();
             e.masks.as_ref().map_or_else(detector, |m| file(m, texts))

@@ -77,7 +77,7 @@ fn surveys(run: &RunRecord, texts: &Texts) -> String {
             escape(&epoch.name),
             epoch.date.as_deref().map_or_else(dash, escape),
             count(epoch.clouds.len()),
-            count(epoch.photos),
+            count(epoch.photo_count),
             count(usize::try_from(epoch.points).unwrap_or(usize::MAX)),
             count(epoch.stones),
             datum,

@@ -19,7 +19,7 @@ pub use registration::{
     RegistrationRecord,
 };
 pub use remarks::{Remark, Remarks, Signature, signed_digest};
-pub use run::{CrsRecord, EpochRecord, InputRecord, ProjectRecord, RunRecord, StepTime};
+pub use run::{CrsRecord, EpochRecord, InputRecord, PhotoScale, ProjectRecord, RunRecord, StepTime};
 pub use timestamp::Timestamp;
 pub use trends::{
     ConditionRecord, CurvePoint, EstimateRecord, InseparableRecord, PathPoint, SeasonRecord, TRENDS_VERSION,

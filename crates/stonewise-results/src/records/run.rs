@@ -93,10 +93,21 @@ pub struct EpochRecord {
     pub motion: Option<MotionField>,
     /// Points with finite coordinates.
     pub points: u64,
-    /// Photos, or views of the clouds, that voted.
-    pub photos: usize,
+    /// Number of photos, or of views of the clouds, that were used.
+    pub photo_count: usize,
+    /// The photos and views in which the detector looked for stones; empty with masks.
+    pub photos: Vec<PhotoScale>,
     /// Stones.
     pub stones: usize,
+}
+
+/// A photo, or a view of the clouds, in which the detector looked for stones.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PhotoScale {
+    /// Its file, relative to the folder of the photos; of a view its name.
+    pub photo: PathBuf,
+    /// The scale at which the detector looked at all of it, 1 = as it is.
+    pub scale: f64,
 }
 
 /// An input file or folder.

@@ -85,28 +85,30 @@ impl TilingOptions {
         }
     }
 
-    /// The sizes at which a photo of `width` x `height` pixels is looked at. A smaller size is for stones
-    /// that no tile of the larger sizes shows whole, so it is left out where one tile of a larger size up to
-    /// 1 shows the whole photo.
-    pub fn scales_for(&self, width: u32, height: u32) -> Vec<f64> {
-        let in_one_tile = |&scale: &f64| scaled(width.max(height), scale) <= self.tile_px;
+    /// The sizes at which a photo of `width` x `height` pixels is looked at if its stones have the right size
+    /// at `base`: each of [`scales`](Self::scales) times `base`. A smaller size is for stones that no tile of
+    /// the larger sizes shows whole, so it is left out where one tile of a larger size up to `base` shows the
+    /// whole photo.
+    pub fn scales_for(&self, width: u32, height: u32, base: f64) -> Vec<f64> {
+        let in_one_tile = |&scale: &f64| scaled(width.max(height), scale * base) <= self.tile_px;
         let is_needed = |scale: &f64| {
             !self
                 .scales
                 .iter()
                 .any(|larger| larger > scale && *larger <= 1.0 && in_one_tile(larger))
         };
-        self.scales.iter().copied().filter(is_needed).collect()
+        let needed = self.scales.iter().copied().filter(is_needed);
+        needed.map(|scale| scale * base).collect()
     }
 
-    /// Number of tiles of a photo of this size, all scales together, whether or not the enlarged ones turn
+    /// Number of tiles of a photo of this size, all scales together, whether or not those above `base` turn
     /// out to be needed.
-    pub fn tile_count(&self, width: u32, height: u32) -> u64 {
+    pub fn tile_count(&self, width: u32, height: u32, base: f64) -> u64 {
         let count = |scale: f64| {
             let tiles = |size| origins(scaled(size, scale), self.tile_px, self.overlap_px).len() as u64;
             tiles(width) * tiles(height)
         };
-        self.scales_for(width, height).into_iter().map(count).sum()
+        self.scales_for(width, height, base).into_iter().map(count).sum()
     }
 }
 
@@ -122,13 +124,19 @@ mod tests {
     #[test]
     fn smaller_sizes_are_for_what_no_tile_shows_whole() {
         let options = TilingOptions::default();
-        assert_eq!(options.scales_for(300, 500), [2.0, 1.0]);
-        assert_eq!(options.scales_for(640, 641), [2.0, 1.0, 0.5]);
-        assert_eq!(options.scales_for(1500, 1000), [2.0, 1.0, 0.5, 0.25]);
+        assert_eq!(options.scales_for(300, 500, 1.0), [2.0, 1.0]);
+        assert_eq!(options.scales_for(640, 641, 1.0), [2.0, 1.0, 0.5]);
+        assert_eq!(options.scales_for(1500, 1000, 1.0), [2.0, 1.0, 0.5, 0.25]);
+        assert_eq!(options.scales_for(1500, 1000, 0.5), [1.0, 0.5, 0.25]);
+        assert_eq!(options.scales_for(1500, 1000, 0.4), [0.8, 0.4]);
         let coarse = TilingOptions {
             scales: vec![0.25],
             ..options
         };
-        assert_eq!(coarse.scales_for(300, 500), [0.25], "only what was set is kept");
+        assert_eq!(
+            coarse.scales_for(300, 500, 1.0),
+            [0.25],
+            "only what was set is kept"
+        );
     }
 }

@@ -26,9 +26,9 @@ pub enum TilingError<E> {
 /// The stones of a photo of any size. `relief`: what a cloud says about its surface, at any resolution;
 /// `None` without a cloud.
 ///
-/// The photo is looked at as it is first; where its stones are too small or too large for the detector, also
-/// enlarged or reduced ([`TilingOptions::stone_px`]). `progress` advances by one for every tile,
-/// [`TilingOptions::tile_count`] in all. Memory: the photo once more at each scale in turn, a tile a thread
+/// The photo is looked at reduced to the scale `base` first, 1 = as it is; where its stones are too small or
+/// too large for the detector, also enlarged or reduced from there ([`TilingOptions::stone_px`]). `progress`
+/// advances by one for every tile, [`TilingOptions::tile_count`] in all. Memory: the photo once more at each scale in turn, a tile a thread
 /// in the detector, and the masks found. The result does not depend on the number of threads if the
 /// detector's does not.
 ///
@@ -37,14 +37,14 @@ pub enum TilingError<E> {
 pub fn segment_photo<D: Detector>(
     detector: &D,
     photo: &RgbImage,
+    base: f64,
     relief: Option<&ReliefMap>,
     options: &TilingOptions,
     progress: &dyn Progress,
 ) -> Result<Segmentation, TilingError<D::Error>> {
-    let scales = options.scales_for(photo.width(), photo.height());
-    // The largest size that does not enlarge is looked at everywhere; what it shows says where others are
-    // needed.
-    let rank = |&i: &usize| (scales[i] > 1.0, -scales[i]);
+    let scales = options.scales_for(photo.width(), photo.height(), base);
+    // The largest size up to the base is looked at everywhere; what it shows says where others are needed.
+    let rank = |&i: &usize| (scales[i] > base, -scales[i]);
     let mut order: Vec<usize> = (0..scales.len()).collect();
     order.sort_by(|a, b| rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal));
     let mut candidates: Vec<Candidate> = Vec::new();
@@ -52,7 +52,7 @@ pub fn segment_photo<D: Detector>(
     for (place, &index) in order.iter().enumerate() {
         let size = Size::of(photo, &scales, index);
         let limit = options.stone_px / scales[index];
-        let is_reduced = place > 0 && scales[index] <= 1.0;
+        let is_reduced = place > 0 && scales[index] <= base;
         // Stones up to the overlap are whole in a tile of the next larger size, which shows them better.
         let least = if is_reduced {
             f64::from(options.overlap_px) / scales[order[place - 1]]
@@ -62,7 +62,7 @@ pub fn segment_photo<D: Detector>(
         let seen = Seen::of(&candidates);
         let is_needed = |tile: &Rect| {
             let part = size.scaling.rect(tile);
-            match (place, scales[index] > 1.0) {
+            match (place, scales[index] > base) {
                 (0, _) => true,
                 (_, true) => seen.has_small(&part, limit),
                 (_, false) => seen.has_large(&part, limit),

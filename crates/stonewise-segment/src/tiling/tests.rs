@@ -107,7 +107,7 @@ fn options(tile_px: u32, overlap_px: u32, scales: &[f64]) -> TilingOptions {
 }
 
 fn segmented(labels: &LabelImage, options: &TilingOptions) -> Segmentation {
-    segment_photo(&Oracle, &coloured(labels), None, options, &Silent).unwrap()
+    segment_photo(&Oracle, &coloured(labels), 1.0, None, options, &Silent).unwrap()
 }
 
 /// The share of the pixels of stones that the same stone covers, where stones are paired by most pixels.
@@ -210,7 +210,7 @@ fn small_stones_are_found_enlarged_and_only_their_part_of_the_photo_is() {
             stone_px: 60.0,
             ..options(200, 60, scales)
         };
-        segment_photo(&detector, &photo, None, &options, &Silent)
+        segment_photo(&detector, &photo, 1.0, None, &options, &Silent)
             .unwrap()
             .scores
             .len()

@@ -146,7 +146,7 @@ pub fn evaluate_samples<D: Detector>(
 ) -> Result<MaskScore, TilingError<D::Error>> {
     let pairs = samples.iter().map(|sample| {
         let options = TilingOptions::whole(sample.image());
-        let found = segment_photo(detector, sample.image(), sample.relief(), &options, &Silent)?;
+        let found = segment_photo(detector, sample.image(), 1.0, sample.relief(), &options, &Silent)?;
         Ok(pair_masks(&found, sample.labels(), sample.ignore()))
     });
     let pairs: Vec<PhotoPairs> = pairs.collect::<Result<_, TilingError<D::Error>>>()?;

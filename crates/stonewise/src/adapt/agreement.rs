@@ -89,10 +89,11 @@ pub fn agreement(run: &Run, lesson: &Lesson) -> Result<BTreeMap<Block, Counts>> 
             .collect();
         run.context.progress.begin("photos", segmented.views.len() as u64);
         for view in &segmented.views {
-            let sight = Sight::of(run, &labelled, &segmented, view)?;
-            for (part, counts) in counted(&sight, &confirmed, &part_of) {
-                let sum = all.entry(part).or_default();
-                *sum = sum.plus(&counts);
+            if let Some(sight) = Sight::of(run, &labelled, &segmented, view)? {
+                for (part, counts) in counted(&sight, &confirmed, &part_of) {
+                    let sum = all.entry(part).or_default();
+                    *sum = sum.plus(&counts);
+                }
             }
             run.context.progress.advance(1);
         }

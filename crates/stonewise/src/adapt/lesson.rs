@@ -258,7 +258,10 @@ fn teach(
         let mut photos = Vec::new();
         context.progress.begin("photos", segmented.views.len() as u64);
         for (photo, view) in segmented.views.iter().enumerate() {
-            let sight = Sight::of(run, labelled, segmented, view)?;
+            let Some(sight) = Sight::of(run, labelled, segmented, view)? else {
+                context.progress.advance(1);
+                continue;
+            };
             let had = before.map_or(BTreeMap::new(), |before| owners(before, view.image));
             let deleted = had
                 .into_keys()

@@ -86,16 +86,19 @@ pub struct Pixels {
 }
 
 impl Sight {
-    /// A photo of an epoch.
-    pub fn of(run: &Run, labelled: &Labelled, segmented: &Segmented, view: &View) -> Result<Self> {
+    /// A photo of an epoch; `None` where the detector did not look at it.
+    pub fn of(run: &Run, labelled: &Labelled, segmented: &Segmented, view: &View) -> Result<Option<Self>> {
+        let Some(masks) = segmented.labels(view.image)? else {
+            return Ok(None);
+        };
         let tiles = &labelled.ingested.tiles.surveyed;
         let labels = |tile| labelled.labels(tile);
         let params = &run.context.project.settings.label;
-        Ok(Self {
-            masks: segmented.labels(view.image)?,
+        Ok(Some(Self {
+            masks,
             cloud: photo_stones(tiles, labels, view, params, run.context.progress)?,
             owners: owners(labelled, view.image),
-        })
+        }))
     }
 
     /// The pixels of each stone.

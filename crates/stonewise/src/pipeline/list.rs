@@ -13,6 +13,7 @@ pub static STEPS: &[&Step] = &[
     &steps::ingest::INGEST,
     &steps::overlap::OVERLAP,
     &steps::views::VIEWS,
+    &steps::segment::CHOOSE,
     &steps::segment::SEGMENT,
     &steps::label::LABEL,
     &steps::label::ALIGN,

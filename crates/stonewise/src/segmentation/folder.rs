@@ -97,7 +97,7 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
     let warnings = Warnings::default();
     // Tiles, or boxes.
     let work = |photo: &PathBuf| match (image_size(photo), &boxes) {
-        (Ok((width, height)), None) => job.tiling.tile_count(width, height),
+        (Ok((width, height)), None) => job.tiling.tile_count(width, height, 1.0),
         (Ok((width, height)), Some(boxes)) => {
             let of_photo = boxes.boxes_for(&photo.to_string_lossy(), width, height);
             of_photo.ok().flatten().map_or(0, |b| b.len() as u64)
@@ -130,7 +130,7 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
             |step| {
                 let image = read_rgb(photo).inspect_err(|error| unreadable = Some(error.to_string()))?;
                 let segmented = match &boxes {
-                    None => segment_photo(&detector, &image, None, job.tiling, progress)?,
+                    None => segment_photo(&detector, &image, 1.0, None, job.tiling, progress)?,
                     Some(boxes) => {
                         let of_photo =
                             boxes.boxes_for(&photo.to_string_lossy(), image.width(), image.height())?;

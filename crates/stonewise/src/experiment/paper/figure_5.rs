@@ -20,7 +20,10 @@ pub(super) fn figure_5(context: &Context) -> Result<Option<(String, Vec<u8>)>> {
     let Some((index, photo)) = photos.max_by_key(|(i, p)| (p.instances.len(), usize::MAX - i)) else {
         return Ok(None);
     };
-    let (image, labels) = (read_rgb(&photo.path)?, segmented.labels(ImageId(index as u32))?);
+    let Some(labels) = segmented.labels(ImageId(index as u32))? else {
+        return Ok(None);
+    };
+    let image = read_rgb(&photo.path)?;
     let step = image.width().div_ceil(WIDTH_PX).max(1);
     let path = context.out.join("figure_5.jpg");
     write_jpeg(&path, &outlined(&every(&image, step), &every(&labels, step)), 85)?;

@@ -6,10 +6,14 @@ use crate::files::write_readable_json;
 use crate::pipeline::context::Context;
 use crate::pipeline::graph::{Need, Run, Step};
 use crate::pipeline::outputs::verdict::VERDICT;
+use crate::pipeline::steps::segment::VotingPhoto;
 use crate::pipeline::until::Until;
 use crate::processor_class;
+use crate::project::Epoch;
 use crate::results::names::RUN;
-use crate::results::records::{CrsRecord, EpochRecord, InputRecord, ProjectRecord, RunRecord, Timestamp};
+use crate::results::records::{
+    CrsRecord, EpochRecord, InputRecord, PhotoScale, ProjectRecord, RunRecord, Timestamp,
+};
 use crate::storage::step::code_version;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -95,8 +99,22 @@ fn epoch_record(run: &Run, id: EpochId) -> Result<EpochRecord> {
         images: epoch.photos.as_ref().map(|p| p.images.clone()),
         motion: epoch.motion.clone(),
         points: labelled.ingested.tiles.surveyed.point_count(),
-        photos: photos.shown_count(),
+        photo_count: photos.shown_count(),
+        photos: { photos.photos.iter() }
+            .filter_map(|p| looked_at(epoch, p))
+            .collect(),
         stones: labelled.stones.len(),
+    })
+}
+
+/// A photo that the detector looked at.
+fn looked_at(epoch: &Epoch, photo: &VotingPhoto) -> Option<PhotoScale> {
+    let folder = epoch.photos.as_ref().map(|files| files.images.as_path());
+    let relative = folder.and_then(|folder| photo.path.strip_prefix(folder).ok());
+    let name = || photo.path.file_name().map(Path::new);
+    Some(PhotoScale {
+        photo: relative.or_else(name)?.to_path_buf(),
+        scale: photo.scale?,
     })
 }
 

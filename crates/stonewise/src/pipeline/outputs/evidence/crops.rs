@@ -51,7 +51,8 @@ struct OpenPhoto<'a> {
     name: &'a str,
     view: &'a View,
     picture: &'a RgbImage,
-    labels: &'a LabelImage,
+    /// `None` where no stones were looked for.
+    labels: Option<&'a LabelImage>,
 }
 
 /// Cuts a crop of every stone out of the photo of this epoch that shows it largest, writes them, and colours
@@ -107,7 +108,7 @@ pub fn write_epoch_crops(
                 name: &photos.photos[photo].camera,
                 view,
                 picture: &picture,
-                labels: &labels,
+                labels: labels.as_ref(),
             };
             let cut = |job: &&Job| cut(job, &open, motion, side_px);
             let crops: Vec<(Crop, Vec<[u8; 3]>)> = jobs.iter().map(cut).collect();
@@ -235,7 +236,7 @@ fn cut(job: &Job, open: &OpenPhoto, motion: Option<&MotionField>, side_px: u32) 
                 pixel(f64::from(x) + dx, f64::from(y) + dy)
             }));
             let middle = pixel(f64::from(x) + 0.5, f64::from(y) + 0.5);
-            let instance = middle.and_then(|p| labels.at(p)).copied().unwrap_or(0);
+            let instance = middle.and_then(|p| labels?.at(p)).copied().unwrap_or(0);
             if let Some(cell) = mask.get_mut(x, y) {
                 *cell = u32::from(job.instances.contains(&instance));
             }

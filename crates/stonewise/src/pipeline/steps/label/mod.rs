@@ -179,7 +179,7 @@ fn transferred(
     );
     context.step(&format!("label-{epoch}"), key, |step, _| {
         let mut store = DiskLabels::new(step.path(), tiles);
-        let mask = |image| photos.labels(image).map(Some);
+        let mask = |image| photos.labels(image);
         let transfer = transfer_labels(tiles, &photos.views, mask, &mut store, params, context.progress)?;
         write_json(&step.file(TRANSFER), &transfer)
     })

@@ -1,6 +1,8 @@
 //! Photos without masks: their stones, as the detector finds them.
 
-use super::voting_photo::{Instance, PHOTOS, STEP, VotingPhoto, check_any, label_name, posed_photos};
+use super::voting_photo::{
+    Instance, PHOTOS, STEP, VotingPhoto, check_any, label_name, other_size, posed_photos, unusable,
+};
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
@@ -10,7 +12,6 @@ use crate::pipeline::steps::views::{drop_empty, has_no_photos};
 use crate::project::Epoch;
 use crate::storage::step::{Key, StepDir};
 use crate::texts::Said;
-use crate::texts::notices::PHOTO_SIZE;
 use crate::warnings::Warnings;
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
@@ -37,6 +38,8 @@ pub struct Detection<'a> {
     is_of_views: bool,
     /// With views in place of its photos, where the detector looks at both.
     with_views: Option<Epoch>,
+    /// The scale of each photo; `None`: all as they are.
+    chosen: Option<Arc<Vec<Option<f64>>>>,
     name: String,
     key: Key,
     weights: Weights,
@@ -51,6 +54,8 @@ struct Candidate {
     view: View,
     path: PathBuf,
     is_view: bool,
+    /// Scale at which it is looked at first; `None` where it is not.
+    scale: Option<f64>,
 }
 
 /// What became of a photo.
@@ -84,6 +89,11 @@ impl<'a> Detection<'a> {
         {
             digests.extend([context.digest(&files.cameras)?, context.digest(&files.images)?]);
         }
+        let chosen = context
+            .project
+            .chooses_photos(id)
+            .then(|| run.chosen(id))
+            .transpose()?;
         digests.extend(ingested.as_ref().map(|i| i.step.key().as_str().to_owned()));
         let digests: Vec<&str> = digests.iter().map(String::as_str).collect();
 
@@ -93,7 +103,8 @@ impl<'a> Detection<'a> {
             is_of_views: has_no_photos(context.project, id),
             with_views,
             name: format!("{STEP}-{id}"),
-            key: Key::new(STEP, &params.tiling, &digests),
+            key: Key::new(STEP, &(&params.tiling, chosen.as_deref()), &digests),
+            chosen,
             weights,
             ingested,
             detector: OnceCell::new(),
@@ -122,8 +133,11 @@ impl<'a> Detection<'a> {
                 candidates.len()
             )));
         };
-        self.context.progress.begin("tiles", self.tiles(&candidate.view));
-        self.part(number, candidate).map(|_| ())
+        let Some(scale) = candidate.scale else {
+            return Ok(());
+        };
+        self.context.progress.begin("tiles", self.tiles(candidate));
+        self.part(number, candidate, scale).map(|_| ())
     }
 
     /// Posed photos, then views.
@@ -133,20 +147,36 @@ impl<'a> Detection<'a> {
             Some(epoch) => posed_photos(epoch, warnings)?,
             None => Vec::new(),
         };
-        let candidate =
-            |is_view: bool| move |(view, path): (View, PathBuf)| Candidate { view, path, is_view };
-        let photos = photos.into_iter().map(candidate(self.is_of_views));
-        Ok(photos.chain(views.into_iter().map(candidate(true))).collect())
+        let photo = |(number, (view, path)): (usize, (View, PathBuf))| Candidate {
+            view,
+            path,
+            is_view: self.is_of_views,
+            scale: match &self.chosen {
+                Some(scales) => scales.get(number).copied().flatten(),
+                None => Some(1.0),
+            },
+        };
+        let of_clouds = |(view, path): (View, PathBuf)| Candidate {
+            view,
+            path,
+            is_view: true,
+            scale: Some(1.0),
+        };
+        let photos = photos.into_iter().enumerate().map(photo);
+        Ok(photos.chain(views.into_iter().map(of_clouds)).collect())
     }
 
-    fn tiles(&self, view: &View) -> u64 {
+    fn tiles(&self, candidate: &Candidate) -> u64 {
         let tiling = &self.context.project.settings.segment.tiling;
-        tiling.tile_count(view.camera.width, view.camera.height)
+        let camera = &candidate.view.camera;
+        candidate
+            .scale
+            .map_or(0, |scale| tiling.tile_count(camera.width, camera.height, scale))
     }
 
     fn gather(&self, step: &StepDir, warnings: &Warnings) -> Result<Vec<VotingPhoto>> {
         let candidates = self.candidates(warnings)?;
-        let total = candidates.iter().map(|c| self.tiles(&c.view)).sum();
+        let total = candidates.iter().map(|c| self.tiles(c)).sum();
         self.context.progress.begin("tiles", total);
         let mut photos: Vec<VotingPhoto> = Vec::new();
         let count = candidates.len();
@@ -154,20 +184,34 @@ impl<'a> Detection<'a> {
             self.context
                 .progress
                 .detail(&format!("picture {} of {count}", number + 1));
-            let part = self.part(number, &candidate)?;
-            let Candidate { view, path, is_view } = candidate;
-            let outcome: Outcome = read_json(&part.file(PHOTO))?;
+            let (outcome, part) = match candidate.scale {
+                Some(scale) => {
+                    let part = self.part(number, &candidate, scale)?;
+                    (read_json(&part.file(PHOTO))?, Some(part))
+                }
+                None => (Outcome::not_sought(&candidate), None),
+            };
+            let Candidate {
+                view,
+                path,
+                is_view,
+                scale,
+            } = candidate;
             if let Some(reason) = outcome.reason {
                 warnings.skipped(STEP, path.to_string_lossy(), reason);
             }
             let Some(instances) = outcome.instances else {
                 continue;
             };
-            step.take(&part, LABELS, &label_name(photos.len()))?;
+            if let Some(part) = &part {
+                step.take(part, LABELS, &label_name(photos.len()))?;
+            }
             photos.push(VotingPhoto {
                 camera: view.name,
                 path,
                 is_view,
+                is_labelled: part.is_some(),
+                scale,
                 instances,
             });
         }
@@ -175,46 +219,36 @@ impl<'a> Detection<'a> {
         Ok(photos)
     }
 
-    fn part(&self, number: usize, candidate: &Candidate) -> Result<StepDir> {
+    fn part(&self, number: usize, candidate: &Candidate, scale: f64) -> Result<StepDir> {
         let mut is_made = false;
         self.context.progress.check()?;
         let whole = (self.name.as_str(), &self.key);
         let part = self.context.store.part(whole, &format!("{number:05}"), |part| {
             is_made = true;
-            let outcome = self.find(part, candidate)?;
+            let outcome = self.find(part, candidate, scale)?;
             write_json(&part.file(PHOTO), &outcome)
         })?;
         if !is_made {
-            self.context.progress.advance(self.tiles(&candidate.view));
+            self.context.progress.advance(self.tiles(candidate));
         }
         Ok(part)
     }
 
-    fn find(&self, part: &StepDir, candidate: &Candidate) -> Result<Outcome> {
+    fn find(&self, part: &StepDir, candidate: &Candidate, scale: f64) -> Result<Outcome> {
         let progress = self.context.progress;
-        let Candidate { view, path, is_view } = candidate;
+        let Candidate {
+            view, path, is_view, ..
+        } = candidate;
         let image = match read_rgb(path) {
             Ok(image) => image,
             Err(error) => {
-                progress.advance(self.tiles(view));
+                progress.advance(self.tiles(candidate));
                 return Ok(Outcome::left_out(error.to_string()));
             }
         };
-        let (found, expected) = (
-            [image.width(), image.height()],
-            [view.camera.width, view.camera.height],
-        );
-
-        if found != expected {
-            progress.advance(self.tiles(view));
-            let [[width, height], [camera_width, camera_height]] =
-                [found, expected].map(|size| size.map(|px| px.to_string().into()));
-            return Ok(Outcome::left_out(PHOTO_SIZE.say(&[
-                ("width", width),
-                ("height", height),
-                ("camera_width", camera_width),
-                ("camera_height", camera_height),
-            ])));
+        if let Some(reason) = other_size(view, [image.width(), image.height()]) {
+            progress.advance(self.tiles(candidate));
+            return Ok(Outcome::left_out(reason));
         }
 
         let tiling = &self.context.project.settings.segment.tiling;
@@ -225,7 +259,7 @@ impl<'a> Detection<'a> {
             }
             None => None,
         };
-        let mut stones = segment_photo(self.detector()?, &image, relief.as_ref(), tiling, progress)?;
+        let mut stones = segment_photo(self.detector()?, &image, scale, relief.as_ref(), tiling, progress)?;
         if *is_view {
             drop_empty(&mut stones, &image);
         }
@@ -248,6 +282,17 @@ impl<'a> Detection<'a> {
 }
 
 impl Outcome {
+    /// That of a photo in which no stones are looked for.
+    fn not_sought(photo: &Candidate) -> Self {
+        match unusable(&photo.view, &photo.path) {
+            Some(reason) => Self::left_out(reason),
+            None => Self {
+                instances: Some(Vec::new()),
+                reason: None,
+            },
+        }
+    }
+
     fn left_out(reason: impl Into<Said>) -> Self {
         Self {
             instances: None,

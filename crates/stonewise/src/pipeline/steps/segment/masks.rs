@@ -62,6 +62,8 @@ pub fn write_labels(
             camera: view.name,
             path,
             is_view: false,
+            is_labelled: true,
+            scale: None,
             instances,
         });
     }

@@ -1,5 +1,6 @@
 //! The photos of an epoch that can vote: posed, present, with the outlines of their stones.
 
+mod choose;
 mod detector;
 mod masks;
 mod voting_photo;
@@ -13,6 +14,7 @@ use crate::pipeline::steps::views::VIEWS;
 use crate::project::{Epoch, Project};
 use crate::storage::step::{Key, StepDir, look_of};
 use crate::warnings::Warnings;
+pub use choose::CHOOSE;
 use detector::Detection;
 use masks::write_labels;
 use std::path::PathBuf;
@@ -23,7 +25,8 @@ use stonewise_core::id::ImageId;
 use stonewise_core::raster::LabelImage;
 use stonewise_io::masks::read_label_png;
 use stonewise_segment::Weights;
-use voting_photo::{PHOTOS, STEP, VotingPhoto, label_path, posed_photos};
+pub use voting_photo::VotingPhoto;
+use voting_photo::{PHOTOS, STEP, label_path, posed_photos};
 
 /// Brings the stones of every photo of an epoch into one label image each: from masks, where the epoch has
 /// them, else from the detector.
@@ -35,6 +38,7 @@ pub static SEGMENT: Step = Step {
         Need::same(&VIEWS).when(Project::has_views),
         // A detector that takes relief looks at the clouds, too.
         Need::same(&INGEST).when(takes_relief),
+        Need::same(&CHOOSE).when(Project::chooses_photos),
     ],
     cost: Some(|sizes, epoch| Cost::of(2, photo_bytes(sizes, epoch))),
     photos: Some(Photos {
@@ -91,9 +95,12 @@ impl Segmented {
         }
     }
 
-    /// The label image of a photo.
-    pub fn labels(&self, image: ImageId) -> Result<LabelImage> {
-        Ok(read_label_png(&label_path(&self.step, image.0 as usize))?)
+    /// The label image of a photo; `None` where no stones were looked for in it.
+    pub fn labels(&self, image: ImageId) -> Result<Option<LabelImage>> {
+        let number = image.0 as usize;
+        let is_labelled = self.photos.get(number).is_some_and(|photo| photo.is_labelled);
+        let labels = is_labelled.then(|| read_label_png(&label_path(&self.step, number)));
+        Ok(labels.transpose()?)
     }
 }
 

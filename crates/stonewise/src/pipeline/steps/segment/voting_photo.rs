@@ -4,12 +4,13 @@ use crate::error::{Error, Result};
 use crate::project::Epoch;
 use crate::storage::step::StepDir;
 use crate::texts::Said;
-use crate::texts::notices::{CAMERA_NOT_USED, NO_CAMERA, NO_SUCH_PHOTO, UNUSABLE_CAMERA};
+use crate::texts::notices::{CAMERA_NOT_USED, NO_CAMERA, NO_SUCH_PHOTO, PHOTO_SIZE, UNUSABLE_CAMERA};
 use crate::warnings::Warnings;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::View;
 use stonewise_io::cameras::{Remark, find_photos};
+use stonewise_io::image_io::image_size;
 use stonewise_io::masks::InstanceInfo;
 
 /// Name of the step.
@@ -26,6 +27,10 @@ pub struct VotingPhoto {
     pub path: PathBuf,
     /// Whether it is a view of the clouds.
     pub is_view: bool,
+    /// Whether stones were looked for in it, or drawn: whether it has a label image.
+    pub is_labelled: bool,
+    /// Scale at which the detector looked at it first, 1 = as it is; absent where it did not.
+    pub scale: Option<f64>,
     /// Its instances, as the masks name them.
     pub instances: Vec<Instance>,
 }
@@ -49,6 +54,29 @@ impl From<InstanceInfo> for Instance {
             stone_ref: info.stone_ref,
         }
     }
+}
+
+/// Why a photo cannot be used, as far as its header says so.
+pub fn unusable(view: &View, path: &Path) -> Option<Said> {
+    match image_size(path) {
+        Ok((width, height)) => other_size(view, [width, height]),
+        Err(error) => Some(error.to_string().into()),
+    }
+}
+
+/// What is wrong with the size of a photo, pixels, if its camera states another.
+pub fn other_size(view: &View, found: [u32; 2]) -> Option<Said> {
+    let expected = [view.camera.width, view.camera.height];
+    let [[width, height], [camera_width, camera_height]] =
+        [found, expected].map(|size| size.map(|px| px.to_string().into()));
+    (found != expected).then(|| {
+        PHOTO_SIZE.say(&[
+            ("width", width),
+            ("height", height),
+            ("camera_width", camera_width),
+            ("camera_height", camera_height),
+        ])
+    })
 }
 
 /// An epoch of which no photo can be used cannot be measured.

@@ -101,7 +101,7 @@ impl Run<'_> {
     /// Places from which the wall of an epoch is seen: that which the project names, else those of its scanners, else
     /// of cameras: of its photos, of those of another epoch, or of the views of the reference, so that all epochs have
     /// the same outside. Empty where nothing is known.
-    fn outside(&self, id: EpochId) -> Result<Vec<Point3<f64>>> {
+    pub fn outside(&self, id: EpochId) -> Result<Vec<Point3<f64>>> {
         let project = self.context.project;
         let epochs = &project.epochs;
         // Places of another epoch lie in another frame.

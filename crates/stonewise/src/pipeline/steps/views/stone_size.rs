@@ -31,13 +31,13 @@ pub fn smaller_stones(drawing: &Drawing, planned: &[PlannedView]) -> Result<Opti
     for batch in batches(&spread(planned)) {
         let images = drawing.images(batch)?;
         let cameras = batch.iter().map(|planned| &planned.view.camera);
-        let tiles = cameras.map(|c| tiling.tile_count(c.width, c.height)).sum();
+        let tiles = cameras.map(|c| tiling.tile_count(c.width, c.height, 1.0)).sum();
         progress.begin("a first look at the size of stones", tiles);
         for (planned, image) in batch.iter().zip(images) {
             let relief = takes_relief
                 .then(|| photo_relief(drawing.tiles, &planned.view, &settings.label, progress))
                 .transpose()?;
-            let mut stones = segment_photo(&finder, &image, relief.as_ref(), tiling, progress)?;
+            let mut stones = segment_photo(&finder, &image, 1.0, relief.as_ref(), tiling, progress)?;
             drop_empty(&mut stones, &image);
             let mut areas_px: BTreeMap<u32, u64> = BTreeMap::new();
             for id in stones.labels.data().iter().filter(|id| **id > 0) {
