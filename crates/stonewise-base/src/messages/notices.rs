@@ -57,8 +57,8 @@ messages! {
             es gibt; {stones}";
 
         SIZE_OF_STONES:
-            "three quarters of the stones of a first look are larger than {size} m",
-            "drei Viertel der Steine eines ersten Blicks sind größer als {size} m";
+            "nine tenths of the stones of a first look are larger than {size} m",
+            "neun Zehntel der Steine eines ersten Blicks sind größer als {size} m";
 
         SIZE_UNKNOWN:
             "a first look shows too few stones to tell how large they are",

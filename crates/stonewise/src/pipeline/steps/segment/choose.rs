@@ -48,8 +48,9 @@ const CHOSEN_PER_LOOK: usize = 8;
 const MOST_LOOKS: usize = 3;
 /// Fewest stones from which the size of stones is estimated.
 const LEAST_STONES: usize = 20;
-/// Share of the stones that are smaller than the size returned.
-const SMALLER: f64 = 0.25;
+/// Share of the stones that are smaller than the size returned. 0.1: with 0.25, photos of the fountain were reduced to
+/// 0.66 to 0.79, and 5 % fewer pairs of stones were found, though no fewer of the reference masks.
+const SMALLER: f64 = 0.1;
 /// Share of a photo whose pixels on the wall are smaller than those by which its scale is chosen.
 const NEARER: f64 = 0.75;
 /// A photo is reduced to this scale at most: less brings nothing.
@@ -127,7 +128,7 @@ fn scale_for(pixel_m: f64, sights: &[Sight]) -> f64 {
     }
 }
 
-/// The lower quartile of the sizes of stones on the wall (square roots of their areas), metres, from a first look at
+/// The lower decile of the sizes of stones on the wall (square roots of their areas), metres, from a first look at
 /// some photos; none where they show few.
 fn smaller_stones(
     context: &Context,
