@@ -38,7 +38,8 @@ pub fn run_record(project: &str, epochs: &[&str]) -> RunRecord {
         images: Some("survey/photos".into()),
         motion: None,
         points: 1_000_000,
-        photos: 12,
+        photo_count: 12,
+        photos: Vec::new(),
         stones: 24,
     };
     RunRecord {

@@ -371,7 +371,8 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
         images: Some("photos".into()),
         motion: None,
         points: 1_000_000,
-        photos: 12,
+        photo_count: 12,
+        photos: Vec::new(),
         stones: 200,
     };
 
