@@ -60,7 +60,7 @@ def make(program, folder, kind, seed):
             if ran.returncode not in (0, 3):
                 sys.exit(f"{words[0]} of {folder}: {ran.stderr}")
     predicted = json.loads((design / "design.json").read_text())
-    stones = pd.read_parquet(results / "stones.parquet")
+    stones = pd.read_parquet(results / "data" / "stones.parquet")
     return predicted, stones[stones["status"] == "ok"]
 
 

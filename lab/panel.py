@@ -842,7 +842,7 @@ def compare(scene, motions, results):
 
 def with_truth(scene, motions, results):
     """The stones of a run, each with the true stone of most of its points and the motion there."""
-    [labelled] = (results / "epoch1").glob("*.laz")
+    [labelled] = (results / "data/epoch1").glob("*.laz")
     found = np.array(laspy.read(labelled).stone_id).astype(int)
     stones, true = pd.read_csv(results / "stones.csv"), scene.clouds[0].stone
     points = pd.DataFrame(motions, columns=[f"true_{axis}" for axis in XYZ])

@@ -3,7 +3,7 @@
 
     python3 lab/photos.py RESULTS TRUTH_STONES.csv       # pip install pandas pyarrow scipy
 
-Reads `evidence/tracks_2.parquet` and `stones.csv` of a results folder. Prints a table in Markdown, millimetres in the face,
+Reads `data/evidence/tracks_2.parquet` and `stones.csv` of a results folder. Prints a table in Markdown, millimetres in the face,
 along / up: the errors of the stones that photos measured, less the rigid motion in the face that fits them best, by the
 stone's own points alone, by its photos alone, and by the adjustment. Coverage is the share of the errors within 1.96
 standard deviations. A second table does the same for the rotation about the normal, milliradians, of stones that are truly loose
@@ -28,7 +28,7 @@ ROUNDS = 20
 def main():
     results, truth = Path(sys.argv[1]), Path(sys.argv[2])
     stones = counted(pd.read_csv(results / "stones.csv"), pd.read_csv(truth))
-    both = stones.merge(pd.read_parquet(results / "evidence" / "tracks_2.parquet"), on="stone_id")
+    both = stones.merge(pd.read_parquet(results / "data" / "evidence" / "tracks_2.parquet"), on="stone_id")
     both = both.dropna(subset=[f"{source}_along" for source in ["clouds", "photos", "both"]])
     print("| measured by | stones | NMAD | RMSE | largest | median sd | coverage |")
     print("| --- | --- | --- | --- | --- | --- | --- |")

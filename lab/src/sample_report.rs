@@ -41,14 +41,13 @@ pub fn run(words: &Words) -> Outcome {
     };
     let case = rest.first().map_or("unknown", String::as_str);
     let language = rest.get(1).map_or("en", String::as_str);
-    std::fs::create_dir_all(dir)?;
     let wall = Wall {
         moves: !matches!(case, "still" | "cannot-tell"),
         ..Wall::new(stones)
     };
     write_stones(dir, 1, &(0..stones).map(|i| wall.row(i)).collect::<Vec<_>>())?;
     write_outlines(dir, &(0..stones).map(|i| wall.outline(i)).collect::<Vec<_>>())?;
-    std::fs::write(dir.join("m3c2.csv"), wall.core_points())?;
+    std::fs::write(dir.join(PairFile::M3c2Csv.place(1)), wall.core_points())?;
     wall.write_evidence(dir, stones)?;
     write_records(dir, case, language)?;
     write_report(dir)?;
@@ -443,7 +442,7 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
 
     std::fs::write(dir.join(RUN), serde_json::to_string(&run)?)?;
     std::fs::write(
-        dir.join(PairFile::Registration.name(1)),
+        dir.join(PairFile::Registration.place(1)),
         serde_json::to_string(&registration)?,
     )?;
     std::fs::write(

@@ -21,6 +21,9 @@ from ._native import Error
 
 __all__ = ["Pair", "Results", "Warning", "open"]
 
+# Folder of all result files but those that people open.
+DATA = "data"
+
 
 @dataclass(frozen=True)
 class Warning:  # noqa: A001
@@ -49,8 +52,10 @@ def open(results: Union[str, os.PathLike[str]]) -> Results:  # noqa: A001
     >>> r.stones.query("loose == 1")                         # doctest: +SKIP
     """
     path = Path(results)
-    if not (path / "stones.parquet").is_file():
-        raise Error(f"no stones.parquet here; give the folder that `stonewise run --out` wrote: {path}")
+    if not (path / DATA / "stones.parquet").is_file():
+        if (path / "stones.parquet").is_file():
+            raise Error(f"these results are of an earlier version, which laid its files out otherwise: run again: {path}")
+        raise Error(f"no results here (no {DATA}/stones.parquet); give the folder that `stonewise run --out` wrote: {path}")
     return Results(path)
 
 
@@ -152,7 +157,7 @@ class Pair:
         return _read_json_if_there(self._file("evaluation", "json"))
 
     def _file(self, stem: str, extension: str) -> Path:
-        return self._results.path / f"{self._numbered(stem)}.{extension}"
+        return self._results.path / DATA / f"{self._numbered(stem)}.{extension}"
 
     def _numbered(self, stem: str) -> str:
         return stem if self.number == 1 else f"{stem}_{self.number}"
@@ -225,7 +230,7 @@ class Results(Pair):
     def pairs(self) -> list[Pair]:
         """Each later epoch against the first."""
         found: list[Pair] = [self]
-        while (self.path / f"stones_{len(found) + 1}.parquet").is_file():
+        while (self.path / DATA / f"stones_{len(found) + 1}.parquet").is_file():
             found.append(Pair(self, len(found) + 1))
         return found
 
@@ -237,7 +242,7 @@ class Results(Pair):
     @functools.cached_property
     def series_arrow(self) -> pa.Table:
         """The rows of all later epochs as an Arrow table."""
-        path = self.path / "series.parquet"
+        path = self.path / DATA / "series.parquet"
         if path.is_file():
             return _read_parquet(path)
         names = self.epochs[1:2] or [""]
@@ -272,7 +277,7 @@ class Results(Pair):
     @property
     def report(self) -> Path:
         """The report: one file for a browser."""
-        return self.path / "report" / "index.html"
+        return self.path / "report.html"
 
 
 def _counted(n: int, noun: str) -> str:

@@ -59,7 +59,7 @@ class Adapter(ToolAdapter):
             error = str(failed)
         duration = time.perf_counter() - start
         return TrialResult(
-            outputs=TrialOutputs(run_dir=out, predictions=(out / "stones.parquet",)),
+            outputs=TrialOutputs(run_dir=out, predictions=(out / "data" / "stones.parquet",)),
             scalar_metrics={"runtime_seconds": duration},
             duration_seconds=duration,
             success=error is None,
@@ -99,7 +99,7 @@ def m3c2_motions(*, outputs: TrialOutputs, ground_truth: Iterable[Any], options:
 
     It has no covariance.
     """
-    with (Path(outputs.run_dir) / "m3c2.csv").open(newline="", encoding="utf-8") as file:
+    with (Path(outputs.run_dir) / "data" / "m3c2.csv").open(newline="", encoding="utf-8") as file:
         names = ("x", "y", "z", "NormalX", "NormalY", "NormalZ", "m3c2_distance")
         rows = [[float(row[name] or "nan") for name in names] for row in csv.DictReader(file)]
     table = np.array(rows, dtype=np.float64).reshape(-1, len(names))

@@ -44,7 +44,7 @@ def test_the_page(survey, tmp_path, monkeypatch):
     assert len(examples) >= 5
     for example in examples:
         exec(compile(example, str(PAGE), "exec"), names)
-    assert os.path.isfile("results/stones.parquet")
+    assert os.path.isfile("results/data/stones.parquet")
     assert (names["stones"][0] > 0).any()
 
 

@@ -21,8 +21,8 @@ import stonewise.ray  # noqa: E402
 
 def contents(out: Path) -> dict[str, bytes]:
     """Result files but for those that hold times."""
-    but = ("work", "run.json", "digests.b3", "report")
-    files = (p for p in out.rglob("*") if p.is_file() and p.relative_to(out).parts[0] not in but)
+    but = {"work", "run.json", "digests.b3", "report.html"}
+    files = (p for p in out.rglob("*") if p.is_file() and not {p.relative_to(out).parts[0], p.name} & but)
     return {str(p.relative_to(out)): p.read_bytes() for p in files}
 
 

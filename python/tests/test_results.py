@@ -167,7 +167,7 @@ def test_the_map_has_the_shape_of_the_wall(results):
 
 def test_geoparquet_holds_the_rows_and_the_polygons_of_the_geopackage(results):
     geopandas = pytest.importorskip("geopandas")
-    table = geopandas.read_parquet(results.path / "stones.geo.parquet")
+    table = geopandas.read_parquet(results.path / "data/stones.geo.parquet")
     layer = geopandas.read_file(results.path / "stones.gpkg", layer="stones").set_crs(None, allow_override=True)
     assert table.crs is None
     assert table["stone_id"].tolist() == layer["stone_id"].tolist() == results.stones_arrow["stone_id"].to_pylist()

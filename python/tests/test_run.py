@@ -17,7 +17,7 @@ import pytest
 
 import stonewise
 
-FILES = ["stones.parquet", "stones.csv", "matches.json", "m3c2.csv", "outlines.json"]
+FILES = ["data/stones.parquet", "stones.csv", "data/matches.json", "data/m3c2.csv", "data/outlines.json"]
 
 
 def assert_same_bytes(one: Path, other: Path) -> None:
@@ -123,7 +123,7 @@ def test_an_exception_of_the_callback_stops_the_run(survey, results, tmp_path):
 
     with pytest.raises(Enough):
         stonewise.run(survey / "stonewise.toml", out=tmp_path / "out", progress=stop)
-    with pytest.raises(stonewise.Error, match="no stones.parquet here"):
+    with pytest.raises(stonewise.Error, match="no results here"):
         stonewise.open(tmp_path / "out")
     resumed = stonewise.run(survey / "stonewise.toml", out=tmp_path / "out")
     assert any(step["resumed"] for step in resumed.record["steps"])

@@ -31,7 +31,7 @@ def clouds(survey, results, epochs):
     found = []
     for number, epoch in enumerate(epochs, start=1):
         (name,) = epoch["clouds"]
-        labelled = laspy.read(results.path / f"epoch{number}" / f"{Path(name).stem}.laz")
+        labelled = laspy.read(results.path / "data" / f"epoch{number}" / f"{Path(name).stem}.laz")
         found.append((laspy.read(survey / name), np.asarray(labelled.stone_id, dtype=np.int64)))
     return found
 

@@ -26,5 +26,5 @@ def test_the_snakefile_of_the_page(command, survey, results, tmp_path):
         arguments, cwd=tmp_path, env={**os.environ, "PATH": programs}, capture_output=True, text=True, timeout=600
     )
     assert done.returncode == 0, done.stderr
-    for name in ["stones.parquet", "stones.csv", "m3c2.csv", "outlines.json", "epoch1/cloud_tls.laz"]:
+    for name in ["data/stones.parquet", "stones.csv", "data/m3c2.csv", "data/outlines.json", "data/epoch1/cloud_tls.laz"]:
         assert (tmp_path / "results" / name).read_bytes() == (results.path / name).read_bytes(), name

@@ -10,7 +10,7 @@ const DATA = /<script type="(application\/json|text\/plain)" id="([\w-]+)">([^<]
 
 /** Reads the report's data anew. The elements that hold them come into this page, where the report's views look for them. */
 export async function loadReport(): Promise<Report | null> {
-  const response = await fetch("/report/index.html");
+  const response = await fetch("/report/report.html");
   if (!response.ok) return null;
   document.querySelectorAll(`[${TAKEN}]`).forEach((element) => element.remove());
   for (const [, type, id, text] of (await response.text()).matchAll(DATA)) {

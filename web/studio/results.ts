@@ -8,7 +8,7 @@ import { tx } from "./texts.ts";
 export const resultsPage: Page = (place, live, until) => {
   const note = el("p", { class: "empty" });
   const outdated = el("p", { class: "banner soft", hidden: true }, tx("outdated"));
-  const link = el("a", { href: "/report/index.html", target: "_blank", rel: "noopener", class: "own-tab" }, tx("ownTab"));
+  const link = el("a", { href: "/report/report.html", target: "_blank", rel: "noopener", class: "own-tab" }, tx("ownTab"));
   let frame: HTMLIFrameElement | null = null, version: string | null | undefined;
   const said = el("div");
   place.append(outdated, note, link, said);
@@ -24,7 +24,7 @@ export const resultsPage: Page = (place, live, until) => {
     frame?.remove();
     frame = null;
     if (!version) return;
-    frame = el("iframe", { src: "/report/index.html", title: tx("reportFrame"), class: "report" });
+    frame = el("iframe", { src: "/report/report.html", title: tx("reportFrame"), class: "report" });
     place.append(frame);
   }, until);
 };

@@ -31,7 +31,7 @@ after(async () => {
   if (!given) rmSync(folder, { recursive: true, force: true });
 });
 
-const report = (stones) => join(folder, String(stones), "report/index.html");
+const report = (stones) => join(folder, String(stones), "report.html");
 
 /** How many different colours a canvas shows, from a coarse sample. */
 const colours = (page, selector) =>

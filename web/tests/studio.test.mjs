@@ -247,7 +247,7 @@ test("the whole story: folder, project, run, report, corrections, zone, apply", 
   await page.click(".toolbar >> text=Apply");
   await page.waitForSelector("text=Edits are being applied");
   await page.waitForFunction(() => document.querySelector(".toolbar .primary")?.disabled && !document.querySelector(".edits .chip"), null, { timeout: 120_000 });
-  const audit = readFileSync(join(survey, "results/audit_edits.csv"), "utf8");
+  const audit = readFileSync(join(survey, "results/data/audit_edits.csv"), "utf8");
   assert.match(audit, /merge/);
   assert.equal(rows(), before - 1, audit);
   // What changed: one stone took in the other.

@@ -164,8 +164,14 @@ pub enum Error {
     #[error("{0}")]
     Pdf(String),
     /// There is nothing to report on.
-    #[error("no stones.parquet here; give the folder that `stonewise run --out` wrote: {path}", path = .0.display())]
+    #[error("no results here (no data/stones.parquet); give the folder that `stonewise run --out` wrote: {path}", path = .0.display())]
     NoResults(PathBuf),
+    /// The folder holds results of a version that laid its files out otherwise.
+    #[error(
+        "these results are of an earlier version, which laid its files out otherwise: run again (`stonewise run PROJECT --out {path}`): {path}",
+        path = .0.display()
+    )]
+    OlderResults(PathBuf),
     /// The user stopped the run.
     #[error("interrupted; run the same command again to continue")]
     Interrupted,
@@ -259,6 +265,7 @@ impl Error {
             Self::Results { .. } => "damaged-results",
             Self::Pdf(_) => "pdf",
             Self::NoResults(_) => "no-results",
+            Self::OlderResults(_) => "older-results",
             Self::Interrupted => "interrupted",
         }
     }

@@ -6,7 +6,8 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Writes a file under a temporary name beside `path` and renames it when it is complete.
+/// Writes a file under a temporary name beside `path` and renames it when it is complete; makes its folder where
+/// there is none.
 ///
 /// `write` gets the temporary name. Whatever stops it (an error, a full disk, a panic) removes the temporary
 /// file and leaves an earlier file at `path` as it was. The content reaches the disk before the rename, so a
@@ -21,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// ```
 ///
 /// # Errors
-/// What `write` returns, or the failure to sync or rename; naming the file is left to the caller.
+/// What `write` returns, or the failure to make the folder, to sync or to rename; naming the file is left to the caller.
 pub fn write_atomically<T, E: From<io::Error>>(
     path: &Path,
     write: impl FnOnce(&Path) -> Result<T, E>,
@@ -29,6 +30,9 @@ pub fn write_atomically<T, E: From<io::Error>>(
     let partial = Partial {
         path: partial_name(path)?,
     };
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder)?;
+    }
     let value = write(&partial.path)?;
     publish(&partial.path, path)?;
     Ok(value)

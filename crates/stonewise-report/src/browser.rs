@@ -74,7 +74,7 @@ impl Browser {
         on_path.chain(installed).find(|p| p.is_file()).map(Self).ok_or_else(|| {
             Error::Pdf(format!(
                 "a PDF is printed by Chromium, Chrome or Edge, and none is installed: install one (on Debian and Ubuntu `apt install \
-                 chromium`), name its program in {VARIABLE}, or open report/index.html in any browser and print it to a file"
+                 chromium`), name its program in {VARIABLE}, or open report.html in any browser and print it to a file"
             ))
         })
     }

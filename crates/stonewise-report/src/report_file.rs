@@ -8,21 +8,19 @@ use stonewise_io::atomic::write_atomically;
 use stonewise_results::ResultSet;
 use stonewise_results::names::{PairFile, REPORT_DIR, YEARLY};
 
-/// Makes `report/index.html` from the result files in `dir` alone and returns its path.
+/// Makes `report.html` from the result files in `dir` alone and returns its path.
 ///
 /// One self-contained file: no network, light and dark, printable. With more than two epochs, the report of
-/// the third against the first is `report/index_2.html`, and so on; each links to the others; `report/yearly.html` is
-/// the part of the yearly safety report on measurements, with its tables as CSV beside it. The same
+/// the third against the first is `data/report_2.html`, and so on; each links to the others; `yearly.html` is
+/// the part of the yearly safety report on measurements, with its tables as CSV in `data/report`. The same
 /// results give the same bytes.
 ///
 /// # Errors
 /// `dir` has no stone table, a result file is damaged, or the report cannot be written.
 pub fn write_report(dir: &Path) -> Result<PathBuf, Error> {
     let results = ResultSet::read(dir)?;
-    let folder = dir.join(REPORT_DIR);
-    std::fs::create_dir_all(&folder).map_err(Error::io("making the folder", &folder))?;
     let write = |results: &ResultSet| -> Result<PathBuf, Error> {
-        let path = folder.join(PairFile::ReportPage.name(results.pair));
+        let path = dir.join(PairFile::ReportPage.place(results.pair));
         let page = page(results)?;
         write_atomically(&path, |partial| std::fs::write(partial, page))
             .map_err(Error::io("writing the report", &path))?;
@@ -35,9 +33,9 @@ pub fn write_report(dir: &Path) -> Result<PathBuf, Error> {
         write(&all[pair - 1])?;
     }
     if all.len() > 1 {
-        write_tables(&folder, &all)?;
+        write_tables(&dir.join(REPORT_DIR), &all)?;
         if let Some(page) = all.last().and_then(yearly) {
-            let path = folder.join(YEARLY);
+            let path = dir.join(YEARLY);
             write_atomically(&path, |partial| std::fs::write(partial, page))
                 .map_err(Error::io("writing the report", &path))?;
         }
@@ -72,17 +70,21 @@ mod tests {
             write_json(&folder.path().join(RUN), run).unwrap();
         }
         let points = "x,y,z,nx,ny,nz,m3c2_distance,m3c2_uncertainty\n100,200.4,50.25,1,0,0,0.004,0.001\n";
-        std::fs::write(folder.path().join("m3c2.csv"), points).unwrap();
+        std::fs::write(folder.path().join("data/m3c2.csv"), points).unwrap();
         let evaluation = Evaluation::new("a <known> motion", &EvaluationParams::default());
         let evaluation = Evaluation {
             stones: Some(score_motions(&[], 3, &EvaluationParams::default())),
             ..evaluation
         };
         let json = serde_json::to_string(&evaluation).unwrap();
-        std::fs::write(folder.path().join("evaluation.json"), json).unwrap();
+        std::fs::write(folder.path().join("data/evaluation.json"), json).unwrap();
         let decisions = "event,photo,instance\nmerged_instance,<script>.jpg,4\nmerged_instance,b.jpg,5\n";
-        std::fs::write(folder.path().join("audit_epoch1.csv"), decisions).unwrap();
-        write_json(&folder.path().join("registration.json"), &registration_record()).unwrap();
+        std::fs::write(folder.path().join("data/audit_epoch1.csv"), decisions).unwrap();
+        write_json(
+            &folder.path().join("data/registration.json"),
+            &registration_record(),
+        )
+        .unwrap();
         let path = write_report(folder.path()).unwrap();
         let html = std::fs::read_to_string(&path).unwrap();
         assert_eq!(
@@ -306,10 +308,13 @@ mod tests {
         write_stones(folder.path(), 2, &rows()[..20]).unwrap();
         write_json(&folder.path().join(RUN), &run_record("Wall", &["A", "B", "<C>"])).unwrap();
         write_report(folder.path()).unwrap();
-        let page = |name: &str| std::fs::read_to_string(folder.path().join("report").join(name)).unwrap();
-        assert!(page("index.html").contains("of 24 stones") && page("index_2.html").contains("of 20 stones"));
-        assert!(page("index.html").contains("<a href=\"index_2.html\">A \u{2192} &lt;C&gt;</a>"));
-        assert!(page("index_2.html").contains("<a href=\"index.html\">A \u{2192} B</a>"));
+        let page = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+        assert!(
+            page("report.html").contains("of 24 stones")
+                && page("data/report_2.html").contains("of 20 stones")
+        );
+        assert!(page("report.html").contains("<a href=\"data/report_2.html\">A \u{2192} &lt;C&gt;</a>"));
+        assert!(page("data/report_2.html").contains("<a href=\"../report.html\">A \u{2192} B</a>"));
     }
 
     /// A series of three epochs with one zone, which moved out by 1 and 2 mm.
@@ -376,7 +381,7 @@ mod tests {
     fn a_series_has_a_yearly_report_in_the_order_of_authorities_and_its_tables() {
         let folder = series(Language::English);
         write_report(folder.path()).unwrap();
-        let file = |name: &str| std::fs::read_to_string(folder.path().join("report").join(name)).unwrap();
+        let file = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
         let page = file("yearly.html");
         check_nesting(&page);
         let headings = [
@@ -392,21 +397,21 @@ mod tests {
         assert!(places.is_sorted(), "{places:?}");
         assert!(page.contains("C &lt;3&gt;") && !page.contains("<3>") && !page.contains("<script"));
         assert!(page.contains("temperature 9.5") && page.contains("it takes 4."));
-        assert!(file("index_2.html").contains("href=\"yearly.html\""));
+        assert!(file("data/report_2.html").contains("href=\"../yearly.html\""));
 
-        let paths = file("paths.csv");
+        let paths = file("data/report/paths.csv");
         assert_eq!(paths.lines().count(), 1 + 2 * 2);
         let head: Vec<&str> = paths.lines().next().unwrap().split(',').collect();
         let out = head.iter().position(|c| *c == "out_m").unwrap();
         let cell = paths.lines().nth(4).unwrap().split(',').nth(out).unwrap();
         assert_eq!(cell.parse::<f64>().unwrap(), 0.002);
-        assert_eq!(file("epochs.csv").lines().count(), 4);
-        assert_eq!(file("answers.csv").lines().count(), 5);
-        assert!(file("joints.csv").lines().count() > 10);
+        assert_eq!(file("data/report/epochs.csv").lines().count(), 4);
+        assert_eq!(file("data/report/answers.csv").lines().count(), 5);
+        assert!(file("data/report/joints.csv").lines().count() > 10);
 
         let german = series(Language::German);
         write_report(german.path()).unwrap();
-        let page = std::fs::read_to_string(german.path().join("report/yearly.html")).unwrap();
+        let page = std::fs::read_to_string(german.path().join("yearly.html")).unwrap();
         assert!(page.contains("lang=\"de\"") && page.contains("6 Schlussfolgerung"));
     }
 
@@ -423,7 +428,7 @@ mod tests {
         if let EstimatorRecord::Adjustment(adjustment) = &mut registration.estimator {
             adjustment.converged = true;
         }
-        write_json(&folder.path().join("registration.json"), &registration).unwrap();
+        write_json(&folder.path().join("data/registration.json"), &registration).unwrap();
         let html = std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap();
         let first = html.split("<ul class=\"findings\"><li>").nth(1).unwrap();
         assert!(
@@ -442,7 +447,7 @@ mod tests {
             if let EstimatorRecord::Adjustment(adjustment) = &mut registration.estimator {
                 adjustment.converged = converged;
             }
-            write_json(&folder.path().join("registration.json"), &registration).unwrap();
+            write_json(&folder.path().join("data/registration.json"), &registration).unwrap();
             let html = std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap();
             // The terms are explained in either case.
             let body = html.split("<body>").nth(1).unwrap();
@@ -487,7 +492,7 @@ mod tests {
         if let EstimatorRecord::Adjustment(adjustment) = &mut registration.estimator {
             adjustment.converged = true;
         }
-        write_json(&folder.path().join("registration.json"), &registration).unwrap();
+        write_json(&folder.path().join("data/registration.json"), &registration).unwrap();
         let mut run = run_record("Wall", &["A", "B"]);
         run.parameters.report = params.clone();
         write_json(&folder.path().join(RUN), &run).unwrap();

@@ -1,4 +1,4 @@
-//! What the report's tables say, as CSV beside it.
+//! What the report's tables say, as CSV.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -17,7 +17,7 @@ const AXES: [(&str, &str); 3] = [
     ("out", "out of the face"),
 ];
 
-/// Writes the tables of a series into the folder of the report; `all`: the results of all later epochs.
+/// Writes the tables of a series into their folder; `all`: the results of all later epochs.
 ///
 /// # Errors
 /// A file cannot be written.

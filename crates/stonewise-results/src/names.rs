@@ -1,57 +1,63 @@
-//! The names of all result files.
+//! The places of all result files in the folder of the results. What people open lies at its first level,
+//! everything else in [`DATA_DIR`].
 
 use std::fmt;
+use std::path::{Path, PathBuf};
+use stonewise_base::error::Error;
+
+/// Folder of everything but what people open.
+pub const DATA_DIR: &str = "data";
 
 /// What was run, on what, how, and how long it took.
 pub const RUN: &str = "run.json";
 /// The state of the wall, its zones and its stones for all later epochs.
 pub const VERDICT: &str = "verdict.json";
 /// Polygons of the stones of the first epoch.
-pub const OUTLINES: &str = "outlines.json";
+pub const OUTLINES: &str = "data/outlines.json";
 /// The unrolled wall, where stones were edited by hand: that of the stones as they were found.
-pub const FACADE: &str = "facade.json";
+pub const FACADE: &str = "data/facade.json";
 /// Every edit of a person with who, when and why, and what it did in each epoch.
-pub const EDITS_AUDIT: &str = "audit_edits.csv";
+pub const EDITS_AUDIT: &str = "data/audit_edits.csv";
 /// Every stone that was looked for in an epoch whose photos do not show it.
-pub const CARRY_AUDIT: &str = "audit_carried.csv";
+pub const CARRY_AUDIT: &str = "data/audit_carried.csv";
 /// Rows of all later epochs, where there are more than one.
-pub const SERIES: &str = "series.parquet";
+pub const SERIES: &str = "data/series.parquet";
 /// The model in time of every stone, where there are more than two epochs.
-pub const TRENDS_TABLE: &str = "trends.parquet";
+pub const TRENDS_TABLE: &str = "data/trends.parquet";
 /// What the path over all epochs means.
-pub const TRENDS: &str = "trends.json";
+pub const TRENDS: &str = "data/trends.json";
 /// Other instruments beside the stones around them.
-pub const INSTRUMENTS: &str = "instruments.json";
+pub const INSTRUMENTS: &str = "data/instruments.json";
 /// Zones of deformation of all later epochs.
-pub const ZONES: &str = "zones.parquet";
+pub const ZONES: &str = "data/zones.parquet";
 /// Scores against a table of true stones.
-pub const EVALUATION_TRUTH: &str = "evaluation_truth.json";
+pub const EVALUATION_TRUTH: &str = "data/evaluation_truth.json";
 /// Layers for QGIS.
 pub const GEOPACKAGE: &str = "stones.gpkg";
 /// The stones as a table with their polygons.
-pub const GEOPARQUET: &str = "stones.geo.parquet";
+pub const GEOPARQUET: &str = "data/stones.geo.parquet";
 /// The stones' faces for ParaView.
-pub const FACES_VTP: &str = "stones.vtp";
+pub const FACES_VTP: &str = "data/stones.vtp";
 /// The stones' centroids with their displacements for ParaView.
-pub const DISPLACEMENTS_VTP: &str = "displacements.vtp";
+pub const DISPLACEMENTS_VTP: &str = "data/displacements.vtp";
 /// The stones' faces as a coloured mesh.
-pub const FACES_PLY: &str = "stones.ply";
+pub const FACES_PLY: &str = "data/stones.ply";
 /// The points of stones, coloured by their motion.
-pub const FACE_CLOUD: &str = "stones.laz";
+pub const FACE_CLOUD: &str = "data/stones.laz";
 /// Remarks and signature of people; no run writes it.
-pub const REMARKS: &str = "remarks.json";
-/// Digests of all result files, as `b3sum` writes them.
-pub const DIGESTS: &str = "digests.b3";
-/// Folder of the report.
-pub const REPORT_DIR: &str = "report";
-/// The part of the yearly safety report on measurements, in the folder of the report.
+pub const REMARKS: &str = "data/remarks.json";
+/// Digests of all result files by their places in the folder of the results, as `b3sum` writes them.
+pub const DIGESTS: &str = "data/digests.b3";
+/// Folder of the report's tables.
+pub const REPORT_DIR: &str = "data/report";
+/// The part of the yearly safety report on measurements.
 pub const YEARLY: &str = "yearly.html";
 /// Folder of the excerpts that the report shows.
-pub const EVIDENCE_DIR: &str = "evidence";
+pub const EVIDENCE_DIR: &str = "data/evidence";
 /// Folder of the steps' files.
 pub const WORK_DIR: &str = "work";
 
-/// A file that every later epoch has: the second epoch's is `stones.csv`, the third's `stones_2.csv`, and so
+/// A file that every later epoch has: the second epoch's is `stones.csv`, the third's `data/stones_2.csv`, and so
 /// on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PairFile {
@@ -71,7 +77,7 @@ pub enum PairFile {
     Neighbours,
     /// Scores against the motion in the project file.
     Evaluation,
-    /// The report, in its folder.
+    /// The report.
     ReportPage,
 }
 
@@ -87,9 +93,17 @@ impl PairFile {
             Self::Registration => ("registration", "json"),
             Self::Neighbours => ("neighbours", "parquet"),
             Self::Evaluation => ("evaluation", "json"),
-            Self::ReportPage => ("index", "html"),
+            Self::ReportPage => ("report", "html"),
         };
         format!("{}.{extension}", numbered(stem, pair))
+    }
+
+    /// Place of the file of a pair in the folder of the results, with `/`.
+    pub fn place(self, pair: usize) -> String {
+        match (self, pair) {
+            (Self::StonesCsv | Self::ReportPage, 1) => self.name(pair),
+            _ => format!("{DATA_DIR}/{}", self.name(pair)),
+        }
     }
 }
 
@@ -103,12 +117,47 @@ pub fn numbered(stem: impl fmt::Display, pair: usize) -> String {
 
 /// Decisions about the mask instances of an epoch, counted from 1.
 pub fn audit(epoch: usize) -> String {
-    format!("audit_epoch{epoch}.csv")
+    format!("{DATA_DIR}/audit_epoch{epoch}.csv")
 }
 
-/// Folder of the clouds of an epoch, counted from 1.
+/// Folder of the labelled clouds of an epoch, counted from 1.
 pub fn epoch_dir(epoch: usize) -> String {
-    format!("epoch{epoch}")
+    format!("{DATA_DIR}/epoch{epoch}")
+}
+
+/// Whether a file of the results, by its place, belongs to the report: a page, or a table beside the pages.
+pub fn is_of_report(file: &Path) -> bool {
+    file.starts_with(REPORT_DIR) || is_report_page(file)
+}
+
+/// Whether a file of the results, by its place, is a page of the report.
+pub fn is_report_page(file: &Path) -> bool {
+    let is_later = |name: &str| {
+        let pair = name
+            .strip_prefix("data/report_")
+            .and_then(|name| name.strip_suffix(".html"));
+        pair.is_some_and(|pair| pair.bytes().all(|b| b.is_ascii_digit()))
+    };
+    let name = file.to_string_lossy().replace('\\', "/");
+    name == PairFile::ReportPage.place(1) || name == YEARLY || is_later(&name)
+}
+
+/// Whether `dir` holds results of an earlier version, which had almost everything at the first level.
+pub fn is_of_older_layout(dir: &Path) -> bool {
+    dir.join(PairFile::StonesParquet.name(1)).is_file()
+}
+
+/// The table of the first pair, which all results have.
+///
+/// # Errors
+/// `dir` holds no results, or those of an older layout.
+pub fn stones_in(dir: &Path) -> Result<PathBuf, Error> {
+    let table = dir.join(PairFile::StonesParquet.place(1));
+    match table.is_file() {
+        true => Ok(table),
+        false if is_of_older_layout(dir) => Err(Error::OlderResults(dir.to_path_buf())),
+        false => Err(Error::NoResults(dir.to_path_buf())),
+    }
 }
 
 #[cfg(test)]
@@ -116,9 +165,40 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_of_later_epochs_count_from_two() {
-        assert_eq!(PairFile::StonesCsv.name(1), "stones.csv");
+    fn files_of_later_epochs_count_from_two_and_lie_below() {
+        assert_eq!(PairFile::StonesCsv.place(1), "stones.csv");
+        assert_eq!(PairFile::StonesCsv.place(2), "data/stones_2.csv");
+        assert_eq!(PairFile::StonesParquet.place(1), "data/stones.parquet");
+        assert_eq!(PairFile::ReportPage.place(1), "report.html");
+        assert_eq!(PairFile::ReportPage.place(3), "data/report_3.html");
         assert_eq!(PairFile::M3c2Csv.name(2), "m3c2_2.csv");
-        assert_eq!(PairFile::ReportPage.name(2), "index_2.html");
+    }
+
+    #[test]
+    fn pages_of_the_report_are_known_by_their_places() {
+        for page in ["report.html", "yearly.html", "data/report_2.html"] {
+            assert!(
+                is_report_page(Path::new(page)) && is_of_report(Path::new(page)),
+                "{page}"
+            );
+        }
+        for other in [
+            "notes.html",
+            "data/report.html",
+            "data/report_a.html",
+            "data/report/joints.csv",
+        ] {
+            assert!(!is_report_page(Path::new(other)), "{other}");
+        }
+        assert!(is_of_report(Path::new("data/report/joints.csv")));
+    }
+
+    #[test]
+    fn results_of_an_older_layout_are_named_as_such() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = || stones_in(folder.path()).unwrap_err();
+        assert!(matches!(error(), Error::NoResults(_)));
+        std::fs::write(folder.path().join("stones.parquet"), "").unwrap();
+        assert!(matches!(error(), Error::OlderResults(_)) && error().to_string().contains("run again"));
     }
 }

@@ -43,7 +43,10 @@ pub fn write_neighbours(dir: &Path, pair: usize, neighbours: &[NeighbourCovarian
             values,
         )?;
     }
-    Ok(write_parquet(&dir.join(PairFile::Neighbours.name(pair)), &table)?)
+    Ok(write_parquet(
+        &dir.join(PairFile::Neighbours.place(pair)),
+        &table,
+    )?)
 }
 
 /// Reads the file of a pair of epochs, in the order of the stones' numbers; empty if there is none.
@@ -51,7 +54,7 @@ pub fn write_neighbours(dir: &Path, pair: usize, neighbours: &[NeighbourCovarian
 /// # Errors
 /// The file is damaged.
 pub fn read_neighbours(dir: &Path, pair: usize) -> Result<Vec<NeighbourCovariance>, Error> {
-    let path = dir.join(PairFile::Neighbours.name(pair));
+    let path = dir.join(PairFile::Neighbours.place(pair));
     let Some(table) = read_table(&path)? else {
         return Ok(Vec::new());
     };

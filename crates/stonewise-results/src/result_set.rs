@@ -1,7 +1,9 @@
 //! All that a report is made of.
 
 use super::change_points::{DistancePoint, read_csv, read_distance_points};
-use super::names::{CARRY_AUDIT, EDITS_AUDIT, FACADE, INSTRUMENTS, PairFile, RUN, TRENDS, VERDICT, audit};
+use super::names::{
+    CARRY_AUDIT, EDITS_AUDIT, FACADE, INSTRUMENTS, PairFile, RUN, TRENDS, VERDICT, audit, stones_in,
+};
 use super::outlines::{StoneOutline, read_outlines};
 use super::records::{
     Datum, InstrumentsRecord, RegistrationRecord, Remarks, RunRecord, TrendsRecord, Verdict,
@@ -108,15 +110,16 @@ impl ResultSet {
     /// # Errors
     /// As [`Self::read_pair`].
     pub fn read_measured(dir: &Path, pair: usize) -> Result<Self, Error> {
-        let path = dir.join(PairFile::StonesParquet.name(pair));
+        let path = dir.join(PairFile::StonesParquet.place(pair));
         if !is_there(&path)? {
+            stones_in(dir)?;
             return Err(Error::NoResults(dir.into()));
         }
         let mut stones = read_stones(&path)?;
         stones.sort_by_key(|s| s.stone_id);
         let outlines = read_outlines(dir)?;
         let facade: Option<Facade> = read_json(&dir.join(FACADE))?;
-        let core = read_distance_points(&dir.join(PairFile::M3c2Csv.name(pair)))?;
+        let core = read_distance_points(&dir.join(PairFile::M3c2Csv.place(pair)))?;
 
         let facade =
             facade.unwrap_or_else(|| facade_of(stones.iter().map(|s| (s.stone_id, s.centroid)), &outlines));
@@ -125,9 +128,9 @@ impl ResultSet {
             pairs: pairs_in(dir)?,
             distances: core.distances,
             without_distance: core.without_distance,
-            evaluation: read_json(&dir.join(PairFile::Evaluation.name(pair)))?,
+            evaluation: read_json(&dir.join(PairFile::Evaluation.place(pair)))?,
             run: read_json(&dir.join(RUN))?,
-            registration: read_json(&dir.join(PairFile::Registration.name(pair)))?,
+            registration: read_json(&dir.join(PairFile::Registration.place(pair)))?,
             neighbours: read_neighbours(dir, pair)?,
             ..Self::of_stones(stones, outlines, facade)
         })
@@ -248,7 +251,7 @@ pub fn facade_of(
 /// Number of pairs of epochs that have a stone table.
 fn pairs_in(dir: &Path) -> Result<usize, Error> {
     let mut pairs = 0;
-    while is_there(&dir.join(PairFile::StonesParquet.name(pairs + 1)))? {
+    while is_there(&dir.join(PairFile::StonesParquet.place(pairs + 1)))? {
         pairs += 1;
     }
     Ok(pairs)

@@ -1,20 +1,20 @@
 //! Files of stone rows: CSV with its metadata and Parquet, with the columns of the contract.
 
 use super::columns::{RARE_COLUMNS, STONE_COLUMNS, columns_of};
-use super::names::PairFile;
+use super::names::{DATA_DIR, PairFile};
 use super::{RowMotion, StoneRow};
 use std::path::Path;
 use stonewise_base::error::Result;
-use stonewise_io::table::{Table, TableError, read_parquet, write_csv, write_parquet};
+use stonewise_io::table::{Table, TableError, read_parquet, write_csv_described_in, write_parquet};
 
-/// Writes the stones of a pair of epochs into `dir`: `stones.csv` with `stones.csv-metadata.json`, and
-/// `stones.parquet`; of the third epoch `stones_2.csv` and so on.
+/// Writes the stones of a pair of epochs into `dir`: `stones.csv` with
+/// `data/stones.csv-metadata.json`, and `data/stones.parquet`; of the third epoch `data/stones_2.csv` and so on.
 ///
 /// # Errors
 /// A file cannot be written.
 pub fn write_stones(dir: &Path, pair: usize, rows: &[StoneRow]) -> Result<()> {
     let table = stone_table(rows)?;
-    write_parquet(&dir.join(PairFile::StonesParquet.name(pair)), &table)?;
+    write_parquet(&dir.join(PairFile::StonesParquet.place(pair)), &table)?;
     write_stones_csv(dir, pair, &table)
 }
 
@@ -23,8 +23,20 @@ pub fn write_stones(dir: &Path, pair: usize, rows: &[StoneRow]) -> Result<()> {
 /// # Errors
 /// A file cannot be written.
 pub fn write_stones_csv(dir: &Path, pair: usize, table: &Table) -> Result<()> {
-    let csv = dir.join(PairFile::StonesCsv.name(pair));
-    Ok(write_csv(&csv, table, DESCRIPTION, Some("stone_id"))?)
+    let csv = dir.join(PairFile::StonesCsv.place(pair));
+    let name = PairFile::StonesCsv.name(pair);
+    let metadata = dir.join(DATA_DIR).join(format!("{name}-metadata.json"));
+    let way = match pair {
+        1 => format!("../{name}"),
+        _ => name,
+    };
+    Ok(write_csv_described_in(
+        [&csv, &metadata],
+        &way,
+        table,
+        DESCRIPTION,
+        Some("stone_id"),
+    )?)
 }
 
 /// What the stone table as a whole holds.
@@ -105,7 +117,10 @@ mod tests {
         carried[1].carried_from = Some(1);
         for rows in [rows(), Vec::new(), edited, carried] {
             write_stones(folder.path(), 1, &rows).unwrap();
-            assert_eq!(read_stones(&folder.path().join("stones.parquet")).unwrap(), rows);
+            assert_eq!(
+                read_stones(&folder.path().join("data/stones.parquet")).unwrap(),
+                rows
+            );
         }
         assert!(read_stones(&folder.path().join("none.parquet")).is_err());
     }
@@ -114,7 +129,7 @@ mod tests {
     fn the_parquet_file_holds_unit_and_meaning_of_every_column() {
         let folder = tempfile::tempdir().unwrap();
         write_stones(folder.path(), 2, &rows()).unwrap();
-        let table = read_parquet(&folder.path().join("stones_2.parquet")).unwrap();
+        let table = read_parquet(&folder.path().join("data/stones_2.parquet")).unwrap();
         assert_eq!(table.metadata("dx.unit"), Some("m"));
         for name in table.names() {
             assert!(
@@ -124,7 +139,7 @@ mod tests {
                 "{name}"
             );
         }
-        assert!(folder.path().join("stones_2.csv-metadata.json").exists());
+        assert!(folder.path().join("data/stones_2.csv-metadata.json").exists());
     }
 
     #[test]

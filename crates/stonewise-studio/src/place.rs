@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 use stonewise::UNFINISHED_FILE;
-use stonewise::results::names::{RUN, WORK_DIR};
+use stonewise::results::names::{RUN, WORK_DIR, is_of_older_layout, stones_in};
 
 /// Name of the project file in the folder of a survey.
 const PROJECT_FILE: &str = "stonewise.toml";
@@ -37,6 +37,9 @@ impl Place {
                 project: project_of(&path),
                 results: path,
             });
+        }
+        if is_of_older_layout(&path) {
+            return Err(io::Error::other(stonewise::Error::OlderResults(path)));
         }
         Ok(Self::of_project(path.join(PROJECT_FILE)))
     }
@@ -86,7 +89,7 @@ fn confined(folder: &Path, path: &str) -> Option<PathBuf> {
 
 /// Whether a run wrote into a folder.
 fn is_results(folder: &Path) -> bool {
-    folder.join(RUN).is_file() && folder.join("stones.parquet").is_file() || is_unfinished(folder)
+    folder.join(RUN).is_file() && stones_in(folder).is_ok() || is_unfinished(folder)
 }
 
 /// Whether a run began in a folder and has not finished.
@@ -162,8 +165,8 @@ mod tests {
         fs::write(&project, "").unwrap();
         assert_eq!(Place::of(&project).unwrap(), expected);
         let results = root.join("out");
-        fs::create_dir(&results).unwrap();
-        fs::write(results.join("stones.parquet"), "").unwrap();
+        fs::create_dir_all(results.join("data")).unwrap();
+        fs::write(results.join("data/stones.parquet"), "").unwrap();
         let record = serde_json::json!({ "project": { "file": project } });
         fs::write(results.join("run.json"), record.to_string()).unwrap();
         let expected = Place {
@@ -180,5 +183,9 @@ mod tests {
         assert_eq!(Place::of(&results).unwrap(), expected);
         fs::remove_file(project).unwrap();
         assert_eq!(Place::of(&results).unwrap().project, None);
+        let older = root.join("older");
+        fs::create_dir(&older).unwrap();
+        fs::write(older.join("stones.parquet"), "").unwrap();
+        assert!(Place::of(&older).unwrap_err().to_string().contains("run again"));
     }
 }

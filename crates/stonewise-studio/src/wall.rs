@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::Path;
-use stonewise::results::names::{FACADE, PairFile};
+use stonewise::results::names::{FACADE, stones_in};
 use stonewise::results::{Facade, facade_of, read_outlines, read_stones};
 use stonewise::{Error, Result};
 use stonewise_base::files::read_json;
@@ -12,17 +12,11 @@ use stonewise_base::files::read_json;
 /// # Errors
 /// There are no results, or a file of them is damaged.
 pub fn wall_of(results: &Path) -> Result<Facade> {
-    let (file, table) = (
-        results.join(FACADE),
-        results.join(PairFile::StonesParquet.name(1)),
-    );
+    let file = results.join(FACADE);
     if fs::exists(&file).map_err(Error::io("reading", &file))? {
         return read_json(&file);
     }
-    if !table.is_file() {
-        return Err(Error::NoResults(results.to_path_buf()));
-    }
-    let stones = read_stones(&table)?;
+    let stones = read_stones(&stones_in(results)?)?;
     let places = stones.iter().map(|s| (s.stone_id, s.centroid));
     Ok(facade_of(places, &read_outlines(results)?))
 }

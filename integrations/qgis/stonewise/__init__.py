@@ -138,6 +138,8 @@ class Plugin:
         package = folder / "stones.gpkg"
         if not package.is_file():
             raise Failure(f"{folder} has no stones.gpkg: choose the folder that stonewise run --out wrote")
+        if not (folder / "data").is_dir():
+            raise Failure(f"{folder} holds results of an earlier version: run again")
         titles, styles = contents(package)
         found = [(name, match) for name in titles for match in [NAME.fullmatch(name)] if match]
         newest = max(int(match[3] or 1) for _, match in found)

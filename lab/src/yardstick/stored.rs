@@ -9,6 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use stonewise::results::names::epoch_dir;
 use stonewise_core::geometry::Rigid3;
 use stonewise_io::table::{CsvFile, CsvRow};
 
@@ -154,11 +155,7 @@ fn real(results: &Path, [x, y]: [f64; 2], is_moved: bool) -> Result<Wall, String
         .collect();
     // Labels are the last of an epoch's further dimensions; in the first, motions follow them.
     let labelled = |epoch: usize, after: usize| -> Result<Points, String> {
-        let folder = [results.join("data"), results.to_path_buf()]
-            .map(|r| r.join(format!("epoch{epoch}")))
-            .into_iter()
-            .find(|f| f.is_dir())
-            .ok_or_else(|| format!("{}: no labelled clouds", results.display()))?;
+        let folder = results.join(epoch_dir(epoch));
         let mut all = Points::new();
         for file in files(&folder)? {
             for (id, mut own) in points(&file, |bytes| &bytes[bytes.len() - after..])? {

@@ -6,6 +6,7 @@ use crate::printer::Printer;
 use anyhow::{Context, Result, bail};
 use std::path::Path;
 use stonewise::check::require_memory_of_clouds;
+use stonewise::results::names::DATA_DIR;
 use stonewise::{Comparison, OutputFolder, Owner, Project, compare_clouds};
 use stonewise_core::change::{M3c2Params, params_from_cloudcompare};
 
@@ -55,7 +56,11 @@ fn compare(
         require_memory_of_clouds(project)?;
     }
     let folder = claim(project, args, force)?;
-    let warnings = compare_clouds(project, what, &folder, printer)?;
+    let below = match args.inputs.as_slice() {
+        [_] => DATA_DIR,
+        _ => "",
+    };
+    let warnings = compare_clouds(project, what, &folder, Path::new(below), printer)?;
     printer.finish();
     for doubt in warnings.iter().filter(|w| w.doubt) {
         printer.log(&format!("DOUBT: {}", doubt.line()));

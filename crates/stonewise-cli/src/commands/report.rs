@@ -6,6 +6,7 @@ use crate::printer::Printer;
 use anyhow::Result;
 use stonewise::OutputFolder;
 use stonewise::report::Pdf;
+use stonewise::results::names::{DATA_DIR, PairFile};
 
 /// Writes the report and the layers again, from result files alone; with `--pdf` as PDF, too.
 pub fn report(args: &ReportArgs, force: bool, printer: &Printer) -> Result<Outcome> {
@@ -15,8 +16,8 @@ pub fn report(args: &ReportArgs, force: bool, printer: &Printer) -> Result<Outco
     stonewise::export::write_layers(&args.results)?;
     folder.note_made_anew()?;
     printer.log(&format!(
-        "wrote {}, stones.gpkg, stones.geo.parquet, stones.vtp and stones.ply",
-        args.results.join("report/index.html").display()
+        "wrote {}, stones.gpkg, and stones.geo.parquet, stones.vtp and stones.ply in {DATA_DIR}",
+        args.results.join(PairFile::ReportPage.place(1)).display()
     ));
     if let Some(pdf) = &pdf {
         match args.yearly {

@@ -7,6 +7,7 @@ use crate::note::note;
 use crate::printer::Printer;
 use anyhow::{Context, Result};
 use std::path::Path;
+use stonewise::results::names::PairFile;
 use stonewise::results::records::{EpochVerdict, State};
 use stonewise::results::{Status, StoneRow};
 use stonewise::{OutputFolder, PREVIOUS_DIR, PROJECT_STEP, Project, ScansProject, Summary, Until, is_scan};
@@ -76,7 +77,10 @@ pub fn run_to(
 /// Ends a finished run: says where the results and the report are, and the verdict.
 pub fn conclude(summary: &Summary, out: &Path, printer: &Printer) {
     printer.log(&format!("results: {}", out.display()));
-    printer.log(&format!("open {}", out.join("report/index.html").display()));
+    printer.log(&format!(
+        "open {}",
+        out.join(PairFile::ReportPage.place(1)).display()
+    ));
     say_verdict(summary, printer);
 }
 

@@ -433,7 +433,7 @@ fn a_doubtful_survey_runs_with_exit_code_3_and_says_so_first() {
     let out = survey.path().join("out");
     let (code, log) = run(survey.path(), &out, &["--quiet"]);
     assert_eq!(code, 3, "{log}");
-    let report = fs::read_to_string(out.join("report/index.html")).unwrap();
+    let report = fs::read_to_string(out.join("report.html")).unwrap();
     let (_, after_title) = report.split_once("</h1>").unwrap();
     assert!(
         after_title.starts_with("<div class=\"verdict"),

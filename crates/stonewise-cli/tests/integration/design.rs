@@ -56,7 +56,7 @@ fn what_is_predicted_from_one_epoch_is_achieved_with_two() {
         String::from_utf8_lossy(&output.stderr)
     );
     let design: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let achieved = read_parquet(&out.join("stones.parquet")).unwrap();
+    let achieved = read_parquet(&out.join("data/stones.parquet")).unwrap();
     for (axis, name) in ["along", "up", "out"].into_iter().enumerate() {
         for (key, column) in [("sd_mm", "sd"), ("sd_deformation_mm", "sd_def")] {
             let cells = achieved.optional::<f64>(&format!("{column}_{name}")).unwrap();

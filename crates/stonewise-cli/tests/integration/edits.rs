@@ -166,7 +166,7 @@ fn edits_change_what_they_name_and_leave_the_rest_alone() {
         }
     }
     assert!(others >= 10, "{others}");
-    let audit = fs::read_to_string(out.join("audit_edits.csv")).unwrap();
+    let audit = fs::read_to_string(out.join("data/audit_edits.csv")).unwrap();
     assert_eq!(audit.lines().count(), 1 + 3 * 2, "{audit}");
     let row = format!(
         "1,merge,A. Keller,2026-11-20,seen on site,\"edits.json, edit 1 (line 2)\",facade,epoch 1,{} {},{whole},",
@@ -174,7 +174,7 @@ fn edits_change_what_they_name_and_leave_the_rest_alone() {
         merged.max(partner)
     );
     assert!(audit.contains(&row), "{row}\n{audit}");
-    let page = fs::read_to_string(out.join("report/index.html")).unwrap();
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
     assert!(
         page.contains("Edits by hand") && page.contains("A. Keller"),
         "the report names the edits"
@@ -193,7 +193,7 @@ fn edits_change_what_they_name_and_leave_the_rest_alone() {
     assert_eq!(copy.run().0, 0);
     assert_eq!(step(out, "register-2")["resumed"], true);
     assert!(
-        fs::read_to_string(out.join("audit_edits.csv"))
+        fs::read_to_string(out.join("data/audit_edits.csv"))
             .unwrap()
             .contains("seen twice")
     );
@@ -206,17 +206,17 @@ fn edits_change_what_they_name_and_leave_the_rest_alone() {
     assert_eq!(copy.run().0, 0);
     for file in [
         "stones.csv",
-        "stones.parquet",
+        "data/stones.parquet",
         "stones.gpkg",
-        "outlines.json",
-        "epoch1/cloud_tls.laz",
+        "data/outlines.json",
+        "data/epoch1/cloud_tls.laz",
     ] {
         assert!(
             fs::read(out.join(file)).unwrap() == fs::read(survey_results().join(file)).unwrap(),
             "{file}"
         );
     }
-    assert!(!out.join("audit_edits.csv").exists() && !out.join("facade.json").exists());
+    assert!(!out.join("data/audit_edits.csv").exists() && !out.join("data/facade.json").exists());
 }
 
 #[test]

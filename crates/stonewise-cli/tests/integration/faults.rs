@@ -268,8 +268,8 @@ impl Bench {
                 wrong.push(format!("{aside} stays after a finished run"));
             }
         }
-        let list = fs::read_to_string(out.join("digests.b3")).unwrap_or_default();
-        for (file, bytes) in contents(out, &["work", "digests.b3"]) {
+        let list = fs::read_to_string(out.join("data/digests.b3")).unwrap_or_default();
+        for (file, bytes) in contents(out, &["work", "data/digests.b3"]) {
             let line = format!("{}  {}", blake3::hash(&bytes).to_hex(), file.display());
             if !list.lines().any(|l| l == line) && !file.to_string_lossy().contains(".partial") {
                 wrong.push(format!("{} is not in the list of digests", file.display()));

@@ -7,7 +7,7 @@ use std::path::Path;
 
 /// What a run writes that may differ between two runs: times, with the digests of the files that hold them, and what
 /// only resuming needs.
-const NOT_COMPARED: [&str; 3] = ["run.json", "digests.b3", "work"];
+const NOT_COMPARED: [&str; 3] = ["run.json", "data/digests.b3", "work"];
 
 /// Results of a run. The report and all else but `run.json` depend on the inputs alone, except for times in
 /// the report.
@@ -169,7 +169,7 @@ fn wrong_parameters_of_a_simulation_are_named_in_a_line_and_leave_nothing() {
 fn writing_that_fails_leaves_no_half_of_a_file() {
     let whole = results(tiny_results());
     let out = tempfile::tempdir().unwrap();
-    for (blocks, file) in [(64, "ingest-1"), (400, "m3c2.csv"), (1600, "report/index.html")] {
+    for (blocks, file) in [(64, "ingest-1"), (400, "m3c2.csv"), (1600, "report.html")] {
         let mut shell = assert_cmd::Command::new("sh");
         shell
             .arg("-c")
@@ -252,7 +252,7 @@ fn damaged_work_is_done_again_and_said() {
     let motions = fs::read(&motions_file).unwrap();
     fs::write(motions_file, &motions[..motions.len() / 2]).unwrap();
     fs::write(folder("m3c2-2").join("done"), "").unwrap();
-    flip(&out.path().join("epoch1/cloud_tls.laz"));
+    flip(&out.path().join("data/epoch1/cloud_tls.laz"));
     let partial = folder("label-1").join(".7_0_0.parquet.123.partial");
     fs::write(&partial, "half").unwrap();
 
@@ -303,8 +303,8 @@ fn results_of_an_earlier_run_do_not_pass_for_those_of_a_failed_one() {
     );
     for gone in [
         "stones.csv",
-        "report/index.html",
-        "epoch1/cloud_tls.laz",
+        "report.html",
+        "data/epoch1/cloud_tls.laz",
         "run.json",
     ] {
         assert!(!out.path().join(gone).exists(), "{gone} looks current");

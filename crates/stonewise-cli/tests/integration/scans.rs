@@ -31,7 +31,7 @@ fn two_scans_alone_are_run_and_scored_against_the_truth() {
         epoch["photos"].as_u64() >= Some(5) && epoch["stones"].as_u64() > Some(5),
         "{epoch}"
     );
-    let report = fs::read_to_string(results.join("report/index.html")).unwrap();
+    let report = fs::read_to_string(results.join("report.html")).unwrap();
     assert!(report.contains("views of the cloud"));
 
     let truth = survey().join("truth/stones.csv");
@@ -42,7 +42,7 @@ fn two_scans_alone_are_run_and_scored_against_the_truth() {
             .arg("--truth")
             .arg(truth),
     );
-    let scores = json(&results.join("evaluation_truth.json"));
+    let scores = json(&results.join("data/evaluation_truth.json"));
     let motions = &scores["external"]["motions"];
     assert!(motions["estimated"].as_u64() > Some(5), "{motions}");
     let error = &motions["errors_without_datum"]["norm_3d"]["median_m"];
@@ -83,12 +83,12 @@ fn views_beside_photos_show_stones_and_track_none() {
 
     let record = json(&results.join("run.json"));
     assert_eq!(record["epochs"][0]["photos"], 2);
-    let audit = fs::read_to_string(results.join("audit_epoch1.csv")).unwrap();
+    let audit = fs::read_to_string(results.join("data/audit_epoch1.csv")).unwrap();
     assert!(audit.contains("view_001.png"), "{audit}");
     let stones = rows(&results.join("stones.csv"));
     let shown = stones.values().map(|row| number(row, "photos"));
     assert!(shown.fold(0.0, f64::max) > 2.0, "{stones:?}");
-    let registration = json(&results.join("registration.json"));
+    let registration = json(&results.join("data/registration.json"));
     let tracked = registration["photos"]["poses_px"].as_array().unwrap();
     assert!(
         !tracked.is_empty() && !registration["photos"].to_string().contains("view_"),

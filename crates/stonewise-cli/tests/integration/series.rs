@@ -120,7 +120,7 @@ fn a_series_has_its_tables_its_answers_and_its_section() {
     let (code, log) = run(dir.path(), out.path(), &[]);
     assert!([0, 3].contains(&code), "{log}");
 
-    let series = read_parquet(&out.path().join("series.parquet")).unwrap();
+    let series = read_parquet(&out.path().join("data/series.parquet")).unwrap();
     let epochs = series.required::<String>("epoch").unwrap();
     assert_eq!(epochs[0], "2019-10");
     let since = series.required::<String>("since").unwrap();
@@ -138,7 +138,7 @@ fn a_series_has_its_tables_its_answers_and_its_section() {
         .collect();
     assert!(known.len() > 5);
 
-    let trends = read_parquet(&out.path().join("trends.parquet")).unwrap();
+    let trends = read_parquet(&out.path().join("data/trends.parquet")).unwrap();
     let velocities = reals(&trends, "v_out");
     assert!(velocities.len() > of("2021-04").len());
     check_hidden(&series, &trends, &hidden);
@@ -152,7 +152,7 @@ fn a_series_has_its_tables_its_answers_and_its_section() {
     let json = |name: &str| -> Value {
         serde_json::from_str(&fs::read_to_string(out.path().join(name)).unwrap()).unwrap()
     };
-    let (found, verdict, record) = (json("trends.json"), json("verdict.json"), json("run.json"));
+    let (found, verdict, record) = (json("data/trends.json"), json("verdict.json"), json("run.json"));
     assert_eq!(
         found["epochs"],
         serde_json::json!(["2019-10", "2020-04", "2020-10", "2021-04"])
@@ -173,7 +173,7 @@ fn a_series_has_its_tables_its_answers_and_its_section() {
     for answer in ["trend", "anomaly"] {
         assert_eq!(verdict["series"][answer]["answer"], "no", "{verdict}");
     }
-    check_instruments(&json("instruments.json"), &record);
+    check_instruments(&json("data/instruments.json"), &record);
     let levels: Vec<&Value> = record["epochs"]
         .as_array()
         .unwrap()
@@ -183,17 +183,17 @@ fn a_series_has_its_tables_its_answers_and_its_section() {
     assert_eq!(levels, [8.0, 11.0, 14.0, 9.0]);
     let sentence = verdict["series"]["sentence"].as_str().unwrap();
     assert!(log.contains(sentence), "{log}");
-    let page = fs::read_to_string(out.path().join("report/index.html")).unwrap();
+    let page = fs::read_to_string(out.path().join("report.html")).unwrap();
     let page = page.replace('\u{a0}', " ");
     assert!(page.contains("<section id=\"series\">") && page.contains(sentence) && page.contains(text));
     assert!(page.contains("<section id=\"instruments\">"));
-    let yearly = fs::read_to_string(out.path().join("report/yearly.html")).unwrap();
+    let yearly = fs::read_to_string(out.path().join("yearly.html")).unwrap();
     assert!(
         yearly.contains("4 Comparison with prediction") && yearly.contains("T4 ("),
         "{yearly}"
     );
     let rows = |name: &str| {
-        fs::read_to_string(out.path().join("report").join(name))
+        fs::read_to_string(out.path().join("data/report").join(name))
             .unwrap()
             .lines()
             .count()

@@ -101,7 +101,7 @@ fn halves_have_the_stones_of_the_edited_epoch() {
         log.contains("edits.json:3: edit 1 is in metres") && log.contains("facade.json"),
         "{log}"
     );
-    let facade = fs::read_to_string(results.join("facade.json")).unwrap();
+    let facade = fs::read_to_string(results.join("data/facade.json")).unwrap();
     write_edits(&file, &edits, Some(&facade));
     let (code, log) = split(survey, &halves);
     assert_eq!(code, 0, "{log}");

@@ -19,25 +19,25 @@ fn a_run_writes_every_result_and_resumes_to_the_same_bytes_with_any_number_of_th
     let out = copy_of(survey_results());
     let files = [
         "stones.csv",
-        "stones.parquet",
-        "epoch1/cloud_tls.laz",
-        "epoch2/cloud_tls.laz",
-        "m3c2.laz",
-        "m3c2.csv",
-        "m3c2.csv-metadata.json",
-        "report/index.html",
+        "data/stones.parquet",
+        "data/epoch1/cloud_tls.laz",
+        "data/epoch2/cloud_tls.laz",
+        "data/m3c2.laz",
+        "data/m3c2.csv",
+        "data/m3c2.csv-metadata.json",
+        "report.html",
         "run.json",
-        "audit_epoch1.csv",
-        "audit_epoch1.csv-metadata.json",
-        "stones.laz",
-        "stones.vtp",
+        "data/audit_epoch1.csv",
+        "data/audit_epoch1.csv-metadata.json",
+        "data/stones.laz",
+        "data/stones.vtp",
         "stones.gpkg",
-        "evidence/crops_1_000.jpg",
-        "evidence/sections_2.parquet",
-        "evidence/cloud_2.parquet",
-        "evidence/tracks_2.parquet",
-        "evidence/track_shifts_2.parquet",
-        "evidence/tracks_2_000.jpg",
+        "data/evidence/crops_1_000.jpg",
+        "data/evidence/sections_2.parquet",
+        "data/evidence/cloud_2.parquet",
+        "data/evidence/tracks_2.parquet",
+        "data/evidence/track_shifts_2.parquet",
+        "data/evidence/tracks_2_000.jpg",
     ];
     for file in files {
         assert!(out.path().join(file).exists(), "{file} is missing");
@@ -46,12 +46,15 @@ fn a_run_writes_every_result_and_resumes_to_the_same_bytes_with_any_number_of_th
     assert!(ok >= 15, "only {ok} stones were measured");
 
     let stones = fs::read(out.path().join("stones.csv")).unwrap();
-    let cloud = fs::read(out.path().join("epoch1/cloud_tls.laz")).unwrap();
-    fs::remove_file(out.path().join("epoch1/cloud_tls.laz")).unwrap();
+    let cloud = fs::read(out.path().join("data/epoch1/cloud_tls.laz")).unwrap();
+    fs::remove_file(out.path().join("data/epoch1/cloud_tls.laz")).unwrap();
     fs::remove_dir_all(out.path().join("work/register-2")).unwrap();
     assert_eq!(run(survey(), out.path(), &["--threads", "1"]).0, 0);
     assert_eq!(fs::read(out.path().join("stones.csv")).unwrap(), stones);
-    assert_eq!(fs::read(out.path().join("epoch1/cloud_tls.laz")).unwrap(), cloud);
+    assert_eq!(
+        fs::read(out.path().join("data/epoch1/cloud_tls.laz")).unwrap(),
+        cloud
+    );
     let run_json: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(out.path().join("run.json")).unwrap()).unwrap();
     let step = |name: &str| {
@@ -75,16 +78,17 @@ fn a_run_writes_every_result_and_resumes_to_the_same_bytes_with_any_number_of_th
     );
 
     // The report is made of result files alone: without the work of the run, and without the survey.
-    let page = fs::read(alone.path().join("report/index.html")).unwrap();
+    let page = fs::read(alone.path().join("report.html")).unwrap();
     fs::remove_dir_all(alone.path().join("work")).unwrap();
-    fs::remove_dir_all(alone.path().join("report")).unwrap();
+    fs::remove_file(alone.path().join("report.html")).unwrap();
     stonewise().arg("report").arg(alone.path()).assert().success();
-    assert!(fs::read(alone.path().join("report/index.html")).unwrap() == page);
+    assert!(fs::read(alone.path().join("report.html")).unwrap() == page);
 }
 
 /// Middle of each stone's mask in the crops of an epoch, metres along and up from the middle of its window.
 fn mask_places(out: &Path, epoch: usize) -> BTreeMap<u32, [f64; 2]> {
-    let table = |stem: &str| read_parquet(&out.join(format!("evidence/{stem}_{epoch}.parquet"))).unwrap();
+    let table =
+        |stem: &str| read_parquet(&out.join(format!("data/evidence/{stem}_{epoch}.parquet"))).unwrap();
     let (crops, outlines) = (table("crops"), table("crop_outlines"));
     let side: f64 = crops.metadata("side_px").unwrap().parse().unwrap();
     let ids = crops.required::<u32>("stone_id").unwrap();
@@ -148,7 +152,7 @@ fn a_known_motion_is_found_again_and_scored() {
     let (code, log) = run(halves.path(), out.path(), &[]);
     assert_eq!(code, 0, "{log}");
     check_crops_show_the_motion(out.path());
-    let text = fs::read_to_string(out.path().join("evaluation.json")).unwrap();
+    let text = fs::read_to_string(out.path().join("data/evaluation.json")).unwrap();
     let evaluation: serde_json::Value = serde_json::from_str(&text).unwrap();
     let errors = &evaluation["stones"]["errors"];
     let stones = errors["in_plane_per_axis"]["rmse_m"].as_f64().unwrap();
@@ -198,7 +202,7 @@ fn bad_inputs_are_named_and_nothing_half_written_stays() {
         (
             "a truncated cloud",
             |dir| {
-                let path = dir.join("epoch2/cloud_tls.laz");
+                let path = dir.join("data/epoch2/cloud_tls.laz");
                 let bytes = fs::read(&path).unwrap();
                 fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
             },

@@ -12,7 +12,7 @@ use tempfile::TempDir;
 
 /// Result files with their bytes, but for those that hold times, and what is stonewise's own.
 fn results(out: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    contents(out, &["work", "run.json", "digests.b3", "report"])
+    contents(out, &["work", "run.json", "data/digests.b3", "report.html"])
         .into_iter()
         .collect()
 }

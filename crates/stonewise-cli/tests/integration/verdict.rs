@@ -71,7 +71,7 @@ fn the_same_verdict_stands_everywhere_and_decides_the_exit_code() {
         (&verdict["sentence"], &verdict["state"])
     );
     assert_eq!(record["parameters"]["thresholds"]["alarm_mm"], 10.0);
-    let page = fs::read_to_string(out.path().join("report/index.html")).unwrap();
+    let page = fs::read_to_string(out.path().join("report.html")).unwrap();
     let page = page.replace('\u{a0}', " ");
     assert!(page.contains(sentence) && page.contains("Ruhr &lt;River&gt; Authority"));
     let epoch = &verdict["epochs"][0];
@@ -184,7 +184,7 @@ fn where_nothing_is_known_about_the_registration_the_results_cannot_tell() {
         "datum_unknown"
     );
     // The same test can be made from the files alone: the common motion is in registration.json.
-    let common = &json(&out.path().join("registration.json"))["datum"]["common_motion"];
+    let common = &json(&out.path().join("data/registration.json"))["datum"]["common_motion"];
     assert_eq!(common.as_array().unwrap().len(), 6);
     assert_eq!(run(dir.path(), out.path(), &[]).0, 0);
 }

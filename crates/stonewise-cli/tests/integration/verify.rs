@@ -25,14 +25,14 @@ fn verify(results: &Path, project: Option<&Path>) -> (i32, String, Vec<String>) 
 
 /// Makes the list of digests that a forger would make.
 fn digest_anew(results: &Path) {
-    let list = fs::read_to_string(results.join("digests.b3")).unwrap();
+    let list = fs::read_to_string(results.join("data/digests.b3")).unwrap();
     let names = list.lines().map(|line| line.split_once("  ").unwrap().1);
     let line = |name| {
         let bytes = fs::read(results.join(name)).unwrap();
         format!("{}  {name}\n", blake3::hash(&bytes).to_hex())
     };
     let anew: String = names.map(line).collect();
-    fs::write(results.join("digests.b3"), anew).unwrap();
+    fs::write(results.join("data/digests.b3"), anew).unwrap();
 }
 
 /// A survey with a known motion and its results.
@@ -55,7 +55,7 @@ fn results_are_held_against_their_run_and_every_change_is_found() {
     assert_eq!(verify(&out, Some(&project)), (0, "holds".to_owned(), Vec::new()));
 
     // A bit of every result file.
-    let but = ["work", "digests.b3"];
+    let but = ["work", "data/digests.b3"];
     let files = contents(&out, &but);
     assert!(files.iter().any(|(f, _)| f.ends_with("evaluation.json")) && files.len() > 20);
     for (file, bytes) in &files {
@@ -75,12 +75,12 @@ fn results_are_held_against_their_run_and_every_change_is_found() {
     // A forger who also makes new digests: one value of one table.
     let forged = |file: &str, change: &dyn Fn(&Path)| {
         let bytes = fs::read(out.join(file)).unwrap();
-        let list = fs::read(out.join("digests.b3")).unwrap();
+        let list = fs::read(out.join("data/digests.b3")).unwrap();
         change(&out.join(file));
         digest_anew(&out);
         let (code, _, failed) = verify(&out, None);
         fs::write(out.join(file), bytes).unwrap();
-        fs::write(out.join("digests.b3"), list).unwrap();
+        fs::write(out.join("data/digests.b3"), list).unwrap();
         assert_eq!(code, 1, "{file}");
         failed
     };
@@ -97,28 +97,23 @@ fn results_are_held_against_their_run_and_every_change_is_found() {
     );
     for (file, key, forgery) in [
         ("verdict.json", "\"moved\": ", "\"moved\": 7"),
-        ("evaluation.json", "\"rmse_m\": ", "\"rmse_m\": 1"),
+        ("data/evaluation.json", "\"rmse_m\": ", "\"rmse_m\": 1"),
     ] {
         // The report is made from both.
         let failed = forged(file, &replace(key, forgery));
         assert!(failed.contains(&format!("tables {file}")), "{file}: {failed:?}");
     }
-    let failed = forged("stones.parquet", &|path| moved_by_a_millimetre(path));
-    for file in [
-        "stones.csv",
-        "evaluation.json",
-        "report/index.html",
-        "stones.gpkg",
-    ] {
+    let failed = forged("data/stones.parquet", &|path| moved_by_a_millimetre(path));
+    for file in ["stones.csv", "data/evaluation.json", "report.html", "stones.gpkg"] {
         assert!(failed.contains(&format!("tables {file}")), "{file}: {failed:?}");
     }
 
     // A report in other words: wrong of this program, and open of another.
-    let names = ["run.json", "report/index.html", "digests.b3"];
+    let names = ["run.json", "report.html", "data/digests.b3"];
     let before = names.map(|name| fs::read(out.join(name)).unwrap());
-    replace("</title>", " </title>")(&out.join("report/index.html"));
+    replace("</title>", " </title>")(&out.join("report.html"));
     digest_anew(&out);
-    let report = vec!["tables report/index.html".to_owned()];
+    let report = vec!["tables report.html".to_owned()];
     assert_eq!(verify(&out, None), (1, "fails".to_owned(), report.clone()));
     let record: Value = serde_json::from_slice(&before[0]).unwrap();
     let program = record["program"].as_str().unwrap();
@@ -135,18 +130,18 @@ fn results_are_held_against_their_run_and_every_change_is_found() {
     }
 
     // Something that the run did not make, and a list that is lost.
-    fs::write(out.join("stones_2.csv"), "stone_id\n").unwrap();
+    fs::write(out.join("data/stones_2.csv"), "stone_id\n").unwrap();
     assert_eq!(
         verify(&out, None),
-        (3, "open".to_owned(), vec!["files stones_2.csv".to_owned()])
+        (3, "open".to_owned(), vec!["files data/stones_2.csv".to_owned()])
     );
-    fs::remove_file(out.join("stones_2.csv")).unwrap();
-    fs::rename(out.join("digests.b3"), dir.path().join("digests.b3")).unwrap();
+    fs::remove_file(out.join("data/stones_2.csv")).unwrap();
+    fs::rename(out.join("data/digests.b3"), dir.path().join("digests.b3")).unwrap();
     assert_eq!(
         verify(&out, None),
-        (3, "open".to_owned(), vec!["files digests.b3".to_owned()])
+        (3, "open".to_owned(), vec!["files data/digests.b3".to_owned()])
     );
-    fs::rename(dir.path().join("digests.b3"), out.join("digests.b3")).unwrap();
+    fs::rename(dir.path().join("digests.b3"), out.join("data/digests.b3")).unwrap();
 
     // An input that was changed: another motion is another parameter of the epoch, other masks another input.
     let masks = contents(dir.path(), &["results"])

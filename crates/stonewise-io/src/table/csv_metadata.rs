@@ -23,11 +23,22 @@ pub fn write_csv_metadata(
     description: &str,
     primary_key: Option<&str>,
 ) -> Result<(), TableError> {
-    let name = csv.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let text = csv_metadata(&name, table, description, primary_key);
+    let name = csv.file_name().unwrap_or_default().to_string_lossy();
     let path = csv.with_file_name(format!("{name}-metadata.json"));
-    write_atomically(&path, |partial| std::fs::write(partial, text))
-        .map_err(|e: std::io::Error| TableError::unwritable(&path, e))
+    write_metadata_of(&name, &path, table, description, primary_key)
+}
+
+/// Writes the metadata of a table into the file `path`; `csv`: the way from its folder to the table, with `/`.
+pub(super) fn write_metadata_of(
+    csv: &str,
+    path: &Path,
+    table: &Table,
+    description: &str,
+    primary_key: Option<&str>,
+) -> Result<(), TableError> {
+    let text = csv_metadata(csv, table, description, primary_key);
+    write_atomically(path, |partial| std::fs::write(partial, text))
+        .map_err(|e: std::io::Error| TableError::unwritable(path, e))
 }
 
 fn csv_metadata(csv: &str, table: &Table, description: &str, primary_key: Option<&str>) -> String {

@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use super::column::Values;
-use super::csv_metadata::write_csv_metadata;
+use super::csv_metadata::{write_csv_metadata, write_metadata_of};
 use super::{Column, Table, TableError};
 use crate::atomic::write_atomically;
 
@@ -36,13 +36,33 @@ pub fn write_csv(
     description: &str,
     primary_key: Option<&str>,
 ) -> Result<(), TableError> {
+    write_csv_alone(path, table)?;
+    write_csv_metadata(path, table, description, primary_key)
+}
+
+/// Writes a table as [`write_csv`] does, with its metadata in the file `metadata`; `way`: from the folder of that
+/// file to the table, with `/`.
+///
+/// # Errors
+/// As [`write_csv`].
+pub fn write_csv_described_in(
+    [path, metadata]: [&Path; 2],
+    way: &str,
+    table: &Table,
+    description: &str,
+    primary_key: Option<&str>,
+) -> Result<(), TableError> {
+    write_csv_alone(path, table)?;
+    write_metadata_of(way, metadata, table, description, primary_key)
+}
+
+fn write_csv_alone(path: &Path, table: &Table) -> Result<(), TableError> {
     write_atomically(path, |partial| {
         let mut out = BufWriter::new(File::create(partial)?);
         write_rows(&mut out, table)?;
         out.flush()
     })
-    .map_err(|e| TableError::unwritable(path, e))?;
-    write_csv_metadata(path, table, description, primary_key)
+    .map_err(|e| TableError::unwritable(path, e))
 }
 
 fn write_rows(out: &mut impl Write, table: &Table) -> io::Result<()> {

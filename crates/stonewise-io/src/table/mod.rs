@@ -13,7 +13,7 @@ mod table_type;
 pub use column::{Cell, Column};
 pub use csv_metadata::write_csv_metadata;
 pub use csv_read::{CsvError, CsvFile, CsvRow};
-pub use csv_write::write_csv;
+pub use csv_write::{write_csv, write_csv_described_in};
 pub use error::TableError;
 pub use parquet_read::{read_columns, read_metadata, read_parquet};
 pub use parquet_write::write_parquet;

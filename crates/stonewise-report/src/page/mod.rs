@@ -197,14 +197,20 @@ fn cover(results: &ResultSet, texts: &Texts) -> String {
         ));
         facts.push(format!("stonewise <b>{}</b>", escape(&run.version)));
     }
+    // The way to a place in the folder of the results, from where this page lies.
+    let up = "../".repeat(PairFile::ReportPage.place(results.pair).matches('/').count());
+    let link = |place: &str| format!("{up}{place}");
     let others = (1..=results.pairs).filter(|p| *p != results.pair);
     facts.extend(others.map(|pair| {
         let name =
             line(pair).unwrap_or_else(|| fill(texts.sections.epoch, &[("n", &(pair + 1).to_string())]));
-        format!("<a href=\"{}\">{name}</a>", PairFile::ReportPage.name(pair))
+        format!(
+            "<a href=\"{}\">{name}</a>",
+            link(&PairFile::ReportPage.place(pair))
+        )
     }));
     if results.verdict.as_ref().is_some_and(|v| v.series.is_some()) {
-        facts.push(format!("<a href=\"{YEARLY}\">{}</a>", texts.yearly.kind));
+        facts.push(format!("<a href=\"{}\">{}</a>", link(YEARLY), texts.yearly.kind));
     }
     let line = if facts.is_empty() {
         String::new()

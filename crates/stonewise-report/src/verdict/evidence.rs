@@ -195,7 +195,7 @@ mod tests {
         if let EstimatorRecord::Adjustment(adjustment) = &mut record.estimator {
             adjustment.converged = true;
         }
-        write_json(&folder.path().join("registration.json"), &record).unwrap();
+        write_json(&folder.path().join("data/registration.json"), &record).unwrap();
         judged(&ResultSet::read_measured(folder.path(), 1).unwrap())
     }
 

@@ -11,7 +11,7 @@ use stonewise_base::error::Error;
 use stonewise_io::layers::{write_geopackage, write_geoparquet, write_vtp};
 use stonewise_io::mesh_ply::write_coloured_mesh;
 
-/// Makes `stones.gpkg`, `stones.geo.parquet`, `stones.vtp`, `displacements.vtp` and `stones.ply`
+/// Makes `stones.gpkg`, and in `data` `stones.geo.parquet`, `stones.vtp`, `displacements.vtp` and `stones.ply`,
 /// from the result files in `dir`.
 ///
 /// The GeoPackage has the stones in the world frame (`stones`), unrolled (`stones_facade`), their
@@ -74,11 +74,11 @@ mod tests {
         let folder = folder(&rows());
         let names = [
             "stones.gpkg",
-            "stones.geo.parquet",
-            "stones.ply",
-            "stones.csv-metadata.json",
-            "stones.vtp",
-            "displacements.vtp",
+            "data/stones.geo.parquet",
+            "data/stones.ply",
+            "data/stones.csv-metadata.json",
+            "data/stones.vtp",
+            "data/displacements.vtp",
         ];
         let bytes = || {
             write_layers(folder.path()).unwrap();

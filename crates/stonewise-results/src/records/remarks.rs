@@ -82,7 +82,7 @@ pub struct Signature {
 /// A file cannot be read.
 pub fn signed_digest(dir: &Path) -> Result<String, Error> {
     let mut hasher = blake3::Hasher::new();
-    let stones = (1..).map(|pair| PairFile::StonesParquet.name(pair));
+    let stones = (1..).map(|pair| PairFile::StonesParquet.place(pair));
     for name in std::iter::once(VERDICT.to_owned()).chain(stones) {
         let path = dir.join(&name);
         if !is_there(&path)? {
@@ -106,21 +106,22 @@ mod tests {
     #[test]
     fn the_digest_holds_verdict_and_all_stones_and_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("data")).unwrap();
         let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
         let digest = || signed_digest(folder.path()).unwrap();
         write("verdict.json", "ab");
-        write("stones.parquet", "c");
+        write("data/stones.parquet", "c");
         let first = digest();
         write("run.json", "x");
         write("stones.gpkg", "x");
         assert_eq!(digest(), first);
-        write("stones_2.parquet", "");
+        write("data/stones_2.parquet", "");
         let two = digest();
-        write("stones_2.parquet", "d");
+        write("data/stones_2.parquet", "d");
         write("verdict.json", "a");
-        write("stones.parquet", "bc");
+        write("data/stones.parquet", "bc");
         assert!(two != first && digest() != two && digest() != first);
-        fs::remove_file(folder.path().join("stones_2.parquet")).unwrap();
+        fs::remove_file(folder.path().join("data/stones_2.parquet")).unwrap();
         assert_ne!(digest(), first);
     }
 }

@@ -30,6 +30,7 @@ use std::time::{Duration, Instant, UNIX_EPOCH};
 use stonewise::check::{Depth, Finding, Verdict, check};
 use stonewise::edits::{Edit, EditsFile};
 use stonewise::project::{project_schema, propose};
+use stonewise::results::names::{PairFile, RUN, is_report_page};
 use stonewise::results::records::Timestamp;
 use stonewise::results::{ResultSet, read_outlines};
 use stonewise::{Error, Language, OutputFolder, Project, Until};
@@ -241,11 +242,10 @@ impl Api {
 
     /// A page of the report, which holds its own scripts.
     fn report(&self, name: &str) -> Answer {
-        let is_page = name.ends_with(".html") && !name.contains('/');
-        let folder = self.place.results.join(stonewise::results::names::REPORT_DIR);
+        let is_page = is_report_page(Path::new(name));
         let (file, length) = self
             .place
-            .open(&folder, name)
+            .open(&self.place.results, name)
             .filter(|_| is_page)
             .ok_or_else(unknown)?;
         Ok(Response::new(200, assets::HTML, Body::File(file, length)).sealed())
@@ -331,8 +331,8 @@ impl Api {
             Some(since.as_nanos().to_string())
         };
         let results = &self.place.results;
-        let report = results.join("report/index.html");
-        let written = changed(&results.join("run.json"));
+        let report = results.join(PairFile::ReportPage.place(1));
+        let written = changed(&results.join(RUN));
         let project = self.place.project.as_deref();
         let inputs = project
             .into_iter()

@@ -122,7 +122,7 @@ fn pages_of_other_sites_and_ports_reach_nothing_even_with_the_cookie() {
         for (method, path) in [
             ("GET", "/api/v1/state"),
             ("POST", "/api/v1/run"),
-            ("GET", "/report/index.html"),
+            ("GET", "/report/report.html"),
         ] {
             let status = studio.ask_with(method, path, &header, "{}").status;
             assert_eq!(status, 403, "{method} {header}");
@@ -149,16 +149,17 @@ fn pages_of_other_sites_and_ports_reach_nothing_even_with_the_cookie() {
 #[test]
 fn nothing_outside_the_folders_is_served() {
     let studio = Tested::new();
-    let report = studio.path("results/report");
-    fs::create_dir_all(&report).unwrap();
-    fs::write(report.join("index.html"), "<p>report</p>").unwrap();
+    let results = studio.path("results");
+    fs::create_dir_all(results.join("data")).unwrap();
+    fs::write(results.join("report.html"), "<p>report</p>").unwrap();
+    fs::write(results.join("notes.html"), "notes").unwrap();
     fs::write(studio.path("secret.html"), "secret").unwrap();
     #[cfg(unix)]
     {
-        std::os::unix::fs::symlink(studio.path("secret.html"), report.join("out.html")).unwrap();
-        std::os::unix::fs::symlink("/etc", report.join("etc.html")).unwrap();
+        std::os::unix::fs::symlink(studio.path("secret.html"), results.join("yearly.html")).unwrap();
+        std::os::unix::fs::symlink("/etc", results.join("data/report_2.html")).unwrap();
     }
-    let served = studio.get("/report/index.html");
+    let served = studio.get("/report/report.html");
     assert_eq!((served.status, served.body.as_str()), (200, "<p>report</p>"));
     // Its scripts are those of whoever made the results: it gets an origin of its own.
     assert!(
@@ -173,10 +174,11 @@ fn nothing_outside_the_folders_is_served() {
         "/report/%2e%2e/%2e%2e/secret.html",
         "/report/..\\..\\secret.html",
         "/report//etc/hosts.html",
-        "/report/out.html",
-        "/report/etc.html",
+        "/report/yearly.html",
+        "/report/data/report_2.html",
+        "/report/notes.html",
         "/report/",
-        "/report/index.html/",
+        "/report/report.html/",
         "/../stonewise.toml",
         "/stonewise.toml",
         "//etc/passwd",

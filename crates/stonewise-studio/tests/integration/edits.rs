@@ -78,7 +78,8 @@ fn a_folder_without_a_project_is_offered_the_one_that_init_writes() {
 fn results_whose_project_is_gone_have_no_edits() {
     let dir = crate::support::survey();
     fs::remove_file(dir.path().join("stonewise.toml")).unwrap();
-    for file in ["run.json", "stones.parquet"] {
+    fs::create_dir(dir.path().join("data")).unwrap();
+    for file in ["run.json", "data/stones.parquet"] {
         fs::write(dir.path().join(file), "{}").unwrap();
     }
     let studio = Tested::of(dir, false);

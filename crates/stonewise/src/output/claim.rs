@@ -9,6 +9,7 @@ use super::previous;
 use super::result_names::{is_made_anew, is_result, result_folders};
 use crate::error::{Error, Result};
 use crate::project::Project;
+use crate::results::names::stones_in;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -65,9 +66,7 @@ impl OutputFolder {
     /// # Errors
     /// Another run works in it; the last run in it has not finished.
     pub fn of_results(path: &Path) -> Result<Self> {
-        if !path.join("stones.parquet").is_file() {
-            return Err(Error::NoResults(path.to_path_buf()));
-        }
+        stones_in(path)?;
         Ok(Self {
             path: path.to_path_buf(),
             forced: false,

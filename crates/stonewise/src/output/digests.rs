@@ -86,14 +86,14 @@ mod tests {
     #[test]
     fn the_list_is_that_of_b3sum() {
         let dir = tempfile::tempdir().unwrap();
-        fs::create_dir(dir.path().join("report")).unwrap();
-        fs::write(dir.path().join("report/index.html"), "abc").unwrap();
-        let digests = Digests::of(dir.path(), &["report/index.html".into()]).unwrap();
+        fs::create_dir(dir.path().join("data")).unwrap();
+        fs::write(dir.path().join("data/m3c2.csv"), "abc").unwrap();
+        let digests = Digests::of(dir.path(), &["data/m3c2.csv".into()]).unwrap();
         digests.write(dir.path()).unwrap();
         // `printf abc | b3sum`
         assert_eq!(
             fs::read_to_string(dir.path().join(DIGESTS)).unwrap(),
-            "6437b3ac38465133ffb63b75273a8db548c558465d79db03fd359c6cd5bd9d85  report/index.html\n"
+            "6437b3ac38465133ffb63b75273a8db548c558465d79db03fd359c6cd5bd9d85  data/m3c2.csv\n"
         );
         assert_eq!(Digests::read(dir.path()).unwrap(), Some(digests));
     }

@@ -5,11 +5,11 @@
 //! finished.
 
 use super::digests::Digests;
-use super::result_names::{PREVIOUS_DIR, cloud_names, is_result};
+use super::result_names::{PREVIOUS_DIR, cloud_names, is_result, of_older_layout};
 use crate::error::{Error, Result};
 use crate::files::{is_there, write_text};
 use crate::project::Project;
-use crate::results::names::{DIGESTS, EVIDENCE_DIR, REPORT_DIR};
+use crate::results::names::{DATA_DIR, DIGESTS, EVIDENCE_DIR, REMARKS, REPORT_DIR};
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::ErrorKind;
@@ -48,9 +48,10 @@ pub(super) fn set_aside(folder: &Path, project: &Project) -> Result<()> {
     write_text(&marker, &text)?;
     sync_folder(folder)?;
     // The list of digests is moved last: where it lies aside, all that belongs to it does.
-    let digests = Path::new(DIGESTS);
-    let is_complete = !is_there(&previous)? || is_there(&previous.join(digests))?;
-    let (last, others): (Vec<_>, Vec<_>) = results.into_iter().partition(|file| file == digests);
+    let digests = [PathBuf::from(DIGESTS), of_older_layout(Path::new(DIGESTS))];
+    let is_aside = |list: &PathBuf| previous.join(list).is_file();
+    let is_complete = !is_there(&previous)? || digests.iter().any(is_aside);
+    let (last, others): (Vec<_>, Vec<_>) = results.into_iter().partition(|file| digests.contains(file));
     for file in others.into_iter().chain(last) {
         let (from, to) = (folder.join(&file), previous.join(&file));
         if !is_complete && !is_there(&to)? {
@@ -58,8 +59,20 @@ pub(super) fn set_aside(folder: &Path, project: &Project) -> Result<()> {
         } else if is_result(&file) {
             fs::remove_file(&from).map_err(Error::io("removing an unfinished result", &from))?;
         }
+        // Folders of an older layout do not stay empty beside the new ones; others are not empty.
+        if let Some(parent) = file.parent().filter(|parent| *parent != Path::new("")) {
+            let _ = fs::remove_dir(folder.join(parent));
+        }
     }
-    Ok(())
+    // What people said of results of an older layout.
+    let (kept, older) = (
+        folder.join(REMARKS),
+        folder.join(of_older_layout(Path::new(REMARKS))),
+    );
+    match is_there(&older)? && !is_there(&kept)? {
+        true => move_file(&older, &kept),
+        false => Ok(()),
+    }
 }
 
 /// Brings labelled clouds of the last run back, where it wrote them: the step that made them compares their
@@ -113,7 +126,7 @@ fn remove_previous(folder: &Path) -> Result<()> {
 fn move_file(from: &Path, to: &Path) -> Result<()> {
     let parent = to.parent().unwrap_or(to);
     fs::create_dir_all(parent).map_err(Error::io("making a folder", parent))?;
-    fs::rename(from, to).map_err(Error::io("moving a result of an earlier run aside", from))
+    fs::rename(from, to).map_err(Error::io("moving a file of an earlier run", from))
 }
 
 /// Result files in a folder, relative to it. Files that others put there are not among them.
@@ -124,7 +137,7 @@ pub(crate) fn results_in(folder: &Path, project: &Project) -> Result<Vec<PathBuf
     let clouds = project.epochs.iter().zip(1..);
     let clouds = clouds.flat_map(|(epoch, number)| cloud_names(number, &epoch.clouds));
     let mut results = named_results_in(folder)?;
-    for cloud in clouds {
+    for cloud in clouds.flat_map(|cloud| [of_older_layout(&cloud), cloud]) {
         if is_there(&folder.join(&cloud))? {
             results.push(cloud);
         }
@@ -139,15 +152,17 @@ pub(crate) fn results_in(folder: &Path, project: &Project) -> Result<Vec<PathBuf
 /// The folder cannot be listed.
 pub(crate) fn named_results_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut results = Vec::new();
-    for below in ["", EVIDENCE_DIR, REPORT_DIR] {
-        let listed = folder.join(below);
+    let current = ["", DATA_DIR, EVIDENCE_DIR, REPORT_DIR].map(PathBuf::from);
+    let older = [EVIDENCE_DIR, REPORT_DIR].map(|below| of_older_layout(Path::new(below)));
+    for below in current.into_iter().chain(older) {
+        let listed = folder.join(&below);
         let entries = match fs::read_dir(&listed) {
             Err(e) if e.kind() == ErrorKind::NotFound => continue,
             entries => entries.map_err(Error::io("listing", &listed))?,
         };
         for entry in entries {
             let entry = entry.map_err(Error::io("listing", &listed))?;
-            let name = Path::new(below).join(entry.file_name());
+            let name = below.join(entry.file_name());
             let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
             if !is_folder && is_result(&name) {
                 results.push(name);
@@ -184,19 +199,19 @@ mod tests {
         );
         for name in [
             "stones.csv",
-            "report/index.html",
-            "epoch1/wall.laz",
-            "digests.b3",
+            "report.html",
+            "data/epoch1/wall.laz",
+            "data/digests.b3",
             "notes.txt",
-            "report/notes.txt",
+            "data/notes.txt",
         ] {
             write(out, name, "first");
         }
         set_aside(out, &project).unwrap();
         assert_eq!(read(out, "stones.csv"), None);
-        assert_eq!(read(out, "previous/report/index.html").unwrap(), "first");
+        assert_eq!(read(out, "previous/report.html").unwrap(), "first");
         assert_eq!(
-            read(out, "report/notes.txt").unwrap(),
+            read(out, "data/notes.txt").unwrap(),
             "first",
             "somebody's own file"
         );
@@ -207,15 +222,15 @@ mod tests {
         for _ in 0..2 {
             write(out, "stones.csv", "half");
             // Of an epoch that the first run did not have.
-            write(out, "stones_2.csv", "half");
+            write(out, "data/stones_2.csv", "half");
             set_aside(out, &project).unwrap();
             assert_eq!(read(out, "stones.csv"), None);
-            assert_eq!(read(out, "stones_2.csv"), None);
+            assert_eq!(read(out, "data/stones_2.csv"), None);
             assert_eq!(read(out, "previous/stones.csv").unwrap(), "first");
-            assert_eq!(read(out, "previous/stones_2.csv"), None);
+            assert_eq!(read(out, "previous/data/stones_2.csv"), None);
         }
-        bring_back(out, Path::new("epoch1/wall.laz")).unwrap();
-        for place in ["epoch1/wall.laz", "previous/epoch1/wall.laz"] {
+        bring_back(out, Path::new("data/epoch1/wall.laz")).unwrap();
+        for place in ["data/epoch1/wall.laz", "previous/data/epoch1/wall.laz"] {
             assert_eq!(read(out, place).unwrap(), "first");
         }
         write(out, "stones.csv", "second");
@@ -226,20 +241,54 @@ mod tests {
     }
 
     #[test]
+    fn nothing_of_an_older_layout_stays_beside_new_results() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path();
+        let project = Project::of_clouds(Path::new("a/x.laz"), Path::new("b/x.laz"), M3c2Params::default());
+        let older = [
+            "stones.parquet",
+            "report/index.html",
+            "evidence/cloud_2.parquet",
+            "epoch1/x.laz",
+            "digests.b3",
+        ];
+        for name in older.iter().chain(&["remarks.json", "notes.txt"]) {
+            write(out, name, "first");
+        }
+        // The second run is killed before it has finished.
+        for _ in 0..2 {
+            set_aside(out, &project).unwrap();
+            write(out, "data/stones.parquet", "half");
+        }
+        assert_eq!(read(out, "previous/data/stones.parquet"), None);
+        for name in older {
+            assert_eq!(read(&out.join(PREVIOUS_DIR), name).unwrap(), "first", "{name}");
+        }
+        finish(out, &["data/stones.parquet".into()], true).unwrap();
+        let mut left: Vec<_> = fs::read_dir(out)
+            .unwrap()
+            .map(|e| e.unwrap().file_name())
+            .collect();
+        left.sort();
+        assert_eq!(left, ["data", "notes.txt"]);
+        assert_eq!(read(out, "data/remarks.json").unwrap(), "first");
+    }
+
+    #[test]
     fn clouds_of_an_epoch_that_the_project_no_longer_has_go_with_the_run_that_made_them() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path();
         let project = Project::of_clouds(Path::new("a/x.laz"), Path::new("b/x.laz"), M3c2Params::default());
-        for name in ["stones.csv", "epoch3/x.laz", "epoch3/mine.laz"] {
+        for name in ["stones.csv", "data/epoch3/x.laz", "data/epoch3/mine.laz"] {
             write(out, name, "first");
         }
-        let made = ["stones.csv".into(), "epoch3/x.laz".into()];
+        let made = ["stones.csv".into(), "data/epoch3/x.laz".into()];
         Digests::of(out, &made).unwrap().write(out).unwrap();
         set_aside(out, &project).unwrap();
-        assert_eq!(read(out, "epoch3/x.laz"), None);
-        assert_eq!(read(out, "previous/epoch3/x.laz").unwrap(), "first");
+        assert_eq!(read(out, "data/epoch3/x.laz"), None);
+        assert_eq!(read(out, "previous/data/epoch3/x.laz").unwrap(), "first");
         finish(out, &["stones.csv".into()], true).unwrap();
-        assert_eq!(read(out, "epoch3/mine.laz").unwrap(), "first");
+        assert_eq!(read(out, "data/epoch3/mine.laz").unwrap(), "first");
     }
 
     #[test]

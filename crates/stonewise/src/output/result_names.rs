@@ -2,15 +2,18 @@
 
 use crate::project::Project;
 use crate::results::names::{
-    DISPLACEMENTS_VTP, EVALUATION_TRUTH, EVIDENCE_DIR, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET,
-    REPORT_DIR, WORK_DIR,
+    DATA_DIR, DISPLACEMENTS_VTP, EVALUATION_TRUTH, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET, WORK_DIR,
+    epoch_dir, is_of_report,
 };
 use std::path::{Path, PathBuf};
 
 /// Where the results of the last finished run lie until the next one has finished.
 pub const PREVIOUS_DIR: &str = "previous";
-/// Result files at the top of the folder, without `_2`, `_3` (of later epochs) and extension.
-const STEMS: [&str; 22] = [
+/// Result files at the first level and in [`DATA_DIR`], without `_2`, `_3` (of later epochs) and extension.
+/// Earlier versions had all of them at the first level.
+const STEMS: [&str; 24] = [
+    "report",
+    "yearly",
     "stones",
     "matches",
     "registration",
@@ -34,7 +37,7 @@ const STEMS: [&str; 22] = [
     "c2m",
     "digests",
 ];
-/// Files in the folder of the report, likewise; earlier versions wrote `observations`.
+/// Files in the folder of the report's tables, likewise; earlier versions wrote the others.
 const REPORT: [&str; 8] = [
     "index",
     "yearly",
@@ -61,11 +64,14 @@ const EVIDENCE: [&str; 8] = [
     "logo",
 ];
 
+/// Folders of pictures and tables, in [`DATA_DIR`] and, of earlier versions, beside it.
+const BELOW: [&str; 2] = ["evidence", "report"];
+
 /// Folders in an output folder that a run of the project writes into.
 pub(super) fn result_folders(project: &Project) -> Vec<PathBuf> {
-    let epochs = (1..=project.epochs.len()).map(|n| PathBuf::from(format!("epoch{n}")));
-    let others = [REPORT_DIR, EVIDENCE_DIR, WORK_DIR, PREVIOUS_DIR];
-    epochs.chain(others.map(PathBuf::from)).collect()
+    let older = (1..=project.epochs.len()).map(|n| of_older_layout(Path::new(&epoch_dir(n))));
+    let others = [DATA_DIR, WORK_DIR, PREVIOUS_DIR].into_iter().chain(BELOW);
+    older.chain(others.map(PathBuf::from)).collect()
 }
 
 /// Whether a run publishes a file of this name, relative to the folder; the labelled clouds apart, see
@@ -85,23 +91,28 @@ pub(super) fn is_result(file: &Path) -> bool {
     if !EXTENSIONS.contains(&extension) {
         return false;
     }
-    match file.parent().unwrap_or(Path::new("")).to_str() {
+    match of_older_layout(file.parent().unwrap_or(Path::new(""))).to_str() {
         // `m3c2` ends with a digit of its own, as do `c2c` and `c2m` not.
         Some("") => STEMS.contains(&stem) || name.starts_with("m3c2.") || name.starts_with("m3c2_"),
-        Some(EVIDENCE_DIR) => EVIDENCE.contains(&stem),
-        Some(REPORT_DIR) => REPORT.contains(&stem),
+        Some("evidence") => EVIDENCE.contains(&stem),
+        Some("report") => REPORT.contains(&stem),
         _ => false,
     }
+}
+
+/// Where earlier versions had a file or folder: not in [`DATA_DIR`].
+pub(super) fn of_older_layout(file: &Path) -> PathBuf {
+    file.strip_prefix(DATA_DIR).unwrap_or(file).to_path_buf()
 }
 
 /// Whether a command makes this result anew from others after the run: the report, the layers, and scores
 /// against a truth of the user's.
 pub(super) fn is_made_anew(file: &Path) -> bool {
     let layers = [GEOPACKAGE, GEOPARQUET, FACES_VTP, DISPLACEMENTS_VTP, FACES_PLY];
-    file.starts_with(REPORT_DIR) || file == EVALUATION_TRUTH || layers.iter().any(|layer| file == *layer)
+    is_of_report(file) || file == EVALUATION_TRUTH || layers.iter().any(|layer| file == *layer)
 }
 
-/// The labelled clouds of one epoch in the folder `epoch{number}`: one LAZ per input, named after it; inputs
+/// The labelled clouds of one epoch in its [`epoch_dir`]: one LAZ per input, named after it; inputs
 /// that share a stem are told apart by a number.
 pub(crate) fn cloud_names(number: usize, clouds: &[PathBuf]) -> Vec<PathBuf> {
     let stem = |p: &PathBuf| p.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -112,7 +123,7 @@ pub(crate) fn cloud_names(number: usize, clouds: &[PathBuf]) -> Vec<PathBuf> {
         } else {
             format!("_{}", twins + 1)
         };
-        PathBuf::from(format!("epoch{number}")).join(format!("{}{number_of_twin}.laz", stem(cloud)))
+        PathBuf::from(epoch_dir(number)).join(format!("{}{number_of_twin}.laz", stem(cloud)))
     };
     clouds.iter().enumerate().map(name).collect()
 }
@@ -134,7 +145,14 @@ mod tests {
             "m3c2_3.csv",
             "audit_epoch2.csv",
             "evaluation_truth.json",
-            "report/index.html",
+            "report.html",
+            "yearly.html",
+            "data/report_2.html",
+            "data/stones_2.csv",
+            "data/m3c2_2.laz",
+            "data/digests.b3",
+            "data/evidence/crops_1_000.jpg",
+            "data/report/joints.csv",
             "report/index_2.html",
             "report/observations.json",
             "evidence/crops_1_000.jpg",
@@ -153,6 +171,9 @@ mod tests {
             "evidence/mine.jpg",
             "my_stones.csv",
             "stonewise.toml",
+            "data/remarks.json",
+            "data/notes.csv",
+            "data/data/stones.csv",
         ] {
             assert!(!is_result(Path::new(name)), "{name}");
         }
@@ -161,7 +182,7 @@ mod tests {
     #[test]
     fn clouds_of_one_stem_get_names_of_their_own() {
         let clouds = ["a/wall.laz", "b/wall.e57", "c.ply"].map(PathBuf::from);
-        let names = ["epoch2/wall.laz", "epoch2/wall_2.laz", "epoch2/c.laz"].map(PathBuf::from);
+        let names = ["wall", "wall_2", "c"].map(|stem| PathBuf::from(format!("data/epoch2/{stem}.laz")));
         assert_eq!(cloud_names(2, &clouds), names);
     }
 }

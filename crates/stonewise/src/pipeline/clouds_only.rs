@@ -56,7 +56,8 @@ pub enum Comparison<'a> {
     },
 }
 
-/// Compares the first two epochs of a project in an output folder; neither photos nor masks are needed.
+/// Compares the first two epochs of a project in an output folder; neither photos nor masks are needed. `below`: where
+/// in the folder the files go; [`DATA_DIR`](crate::results::names::DATA_DIR) beside other results.
 ///
 /// M3C2's normals point at the cameras of the first epoch where it has any. Else they point outside as scanner
 /// positions or the surface itself say; the returned warnings hold a doubt where these do not say it clearly.
@@ -67,6 +68,7 @@ pub fn compare_clouds(
     project: &Project,
     what: Comparison,
     folder: &OutputFolder,
+    below: &Path,
     progress: &dyn Progress,
 ) -> Result<Vec<Warning>> {
     let later = EpochId::at(1);
@@ -78,7 +80,7 @@ pub fn compare_clouds(
     };
     context.agenda.announce(progress);
     let run = Run::new(&context, Until::Compared);
-    let out = folder.path();
+    let out = &folder.path().join(below);
     match what {
         Comparison::M3c2 { recipes } => {
             let first = run.clouds(later)?.first;

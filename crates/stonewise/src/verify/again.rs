@@ -11,7 +11,7 @@ use crate::output::{Digests, OutputFolder, named_results_in, results_in};
 use crate::pipeline::{Until, run as run_project};
 use crate::project::Project;
 use crate::report::write_report;
-use crate::results::names::{DIGESTS, EVALUATION_TRUTH, REPORT_DIR, RUN};
+use crate::results::names::{DIGESTS, EVALUATION_TRUTH, PairFile, RUN};
 use crate::results::records::RunRecord;
 use serde_json::Value;
 use std::fs;
@@ -44,7 +44,7 @@ pub(super) fn again(
 ) -> Result<Vec<Finding>> {
     let scratch = scratch()?;
     let folder = OutputFolder::of_project(scratch.path(), project, false)?;
-    let until = match results.join(REPORT_DIR).exists() {
+    let until = match results.join(PairFile::ReportPage.place(1)).exists() {
         true => Until::Reported,
         false => Until::Registered,
     };

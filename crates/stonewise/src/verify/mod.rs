@@ -12,7 +12,7 @@ mod tables;
 use crate::error::{Error, Result};
 use crate::files::read_json;
 use crate::project::Project;
-use crate::results::names::RUN;
+use crate::results::names::{RUN, is_of_older_layout};
 use crate::results::records::RunRecord;
 pub use finding::{Answer, Finding, Maker, Verification};
 use std::path::Path;
@@ -27,6 +27,9 @@ use stonewise_core::progress::Progress;
 /// done again, interruption. Results that differ are findings.
 pub fn verify(results: &Path, project: Option<&Project>, progress: &dyn Progress) -> Result<Verification> {
     let path = results.join(RUN);
+    if is_of_older_layout(results) {
+        return Err(Error::OlderResults(results.to_path_buf()));
+    }
     if !path.is_file() {
         return Err(Error::NoResults(results.to_path_buf()));
     }

@@ -10,8 +10,8 @@ use crate::output::named_results_in;
 use crate::pipeline::verdict_of_tables;
 use crate::report::write_report;
 use crate::results::names::{
-    DISPLACEMENTS_VTP, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET, PairFile, REPORT_DIR, RUN, SERIES,
-    VERDICT,
+    DISPLACEMENTS_VTP, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET, PairFile, RUN, SERIES, VERDICT,
+    is_of_report,
 };
 use crate::results::records::{EpochRecord, RunRecord};
 use crate::results::{ResultSet, write_stones_csv};
@@ -36,9 +36,9 @@ pub(super) fn tables(results: &Path, run: &RunRecord, progress: &dyn Progress) -
     let mut findings = Vec::new();
     for pair in pairs.clone() {
         progress.check()?;
-        findings.extend(told(&PairFile::StonesCsv.name(pair), text_of(results, pair)));
+        findings.extend(told(&PairFile::StonesCsv.place(pair), text_of(results, pair)));
         findings.extend(told(
-            &PairFile::Evaluation.name(pair),
+            &PairFile::Evaluation.place(pair),
             evaluation(results, run, pair),
         ));
     }
@@ -48,7 +48,10 @@ pub(super) fn tables(results: &Path, run: &RunRecord, progress: &dyn Progress) -
     match made_again(results, run) {
         Ok(again) => findings.extend(again),
         Err(Error::Interrupted) => return Err(Error::Interrupted),
-        Err(error) => findings.push(Finding::new(KIND, REPORT_DIR, Answer::Fails, error.to_string())),
+        Err(error) => {
+            let report = PairFile::ReportPage.place(1);
+            findings.push(Finding::new(KIND, &report, Answer::Fails, error.to_string()));
+        }
     }
     Ok(findings)
 }
@@ -68,7 +71,7 @@ fn fails(subject: &str, message: String) -> Option<Finding> {
 
 /// `stones.csv` is the text of `stones.parquet`.
 fn text_of(results: &Path, pair: usize) -> Compared {
-    let [csv, parquet] = [PairFile::StonesCsv, PairFile::StonesParquet].map(|file| file.name(pair));
+    let [csv, parquet] = [PairFile::StonesCsv, PairFile::StonesParquet].map(|file| file.place(pair));
     let scratch = scratch()?;
     write_stones_csv(scratch.path(), pair, &read_parquet(&results.join(&parquet))?)?;
     let [found, made] = [results, scratch.path()].map(|folder| text(&folder.join(&csv)));
@@ -95,7 +98,7 @@ fn series(results: &Path, run: &RunRecord) -> Compared {
     let reference = run.epochs.first().map(|e| e.name.as_str());
     let is_against_reference = |row: usize| since.as_ref().is_none_or(|s| s[row].as_deref() == reference);
     for (pair, epoch) in run.epochs.iter().enumerate().skip(1) {
-        let name = PairFile::StonesParquet.name(pair);
+        let name = PairFile::StonesParquet.place(pair);
         let table = read_parquet(&results.join(&name))?;
         let rows = (0..stones.len()).filter(|&row| epochs[row] == epoch.name && is_against_reference(row));
         let row_of: BTreeMap<u32, usize> = rows.map(|row| (stones[row], row)).collect();
@@ -142,7 +145,7 @@ fn verdict(results: &Path, run: &RunRecord, progress: &dyn Progress) -> Compared
 /// Scores of the stones in `evaluation.json` are those of the table. Normals of faces are rounded in
 /// `outlines.json`, so that errors in the face and out of it agree to a micrometre.
 fn evaluation(results: &Path, run: &RunRecord, pair: usize) -> Compared {
-    let name = PairFile::Evaluation.name(pair);
+    let name = PairFile::Evaluation.place(pair);
     if !results.join(&name).exists() {
         return Ok(None);
     }
@@ -174,7 +177,7 @@ fn made_again(results: &Path, run: &RunRecord) -> Result<Vec<Finding>> {
     copy_results(results, scratch.path())?;
     let reports = named_results_in(results)?
         .into_iter()
-        .filter(|file| file.starts_with(REPORT_DIR));
+        .filter(|file| is_of_report(file));
     let mut files: Vec<PathBuf> = reports.collect();
     // A run that ended with the registration has neither.
     if files.is_empty() {
@@ -210,7 +213,7 @@ fn made_again(results: &Path, run: &RunRecord) -> Result<Vec<Finding>> {
 fn copy_results(from: &Path, to: &Path) -> Result<()> {
     let sources = |file: &PathBuf| {
         let is_cloud = file.extension().is_some_and(|e| e == "laz");
-        !is_cloud && !file.starts_with(REPORT_DIR)
+        !is_cloud && !is_of_report(file)
     };
     for file in named_results_in(from)?.into_iter().filter(sources) {
         copy(&from.join(&file), &to.join(&file))?;

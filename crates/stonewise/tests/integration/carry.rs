@@ -73,7 +73,7 @@ fn stones(project: &Path, out: &Path, is_enabled: bool) -> Vec<StoneRow> {
     let project = Project::read(&other).unwrap();
     let folder = OutputFolder::of_project(out, &project, false).unwrap();
     run(&project, &folder, Until::Registered, &Silent).unwrap();
-    read_stones(&out.join("stones.parquet")).unwrap()
+    read_stones(&out.join("data/stones.parquet")).unwrap()
 }
 
 /// Blackens what lies to the right of the middle; the wall stands around the origin, its right half at
@@ -114,7 +114,7 @@ fn a_stone_that_one_epoch_shows_divided_is_one() {
         found.into_iter().filter(near).collect()
     };
     let (divided, joined) = (measured(false), measured(true));
-    let audit = fs::read_to_string(out.join("audit_epoch2.csv")).unwrap();
+    let audit = fs::read_to_string(out.join("data/audit_epoch2.csv")).unwrap();
     assert!(audit.contains("joined_parts"), "{audit}");
     // A part that is not joined has no partner, or leaves the rest of the stone out.
     let points = |stones: &[StoneRow], id: u32| {
@@ -142,7 +142,7 @@ fn a_stone_that_the_second_of_three_epochs_shows_whole_is_one_in_all() {
     let out = folder.path().join("out");
     stones(&project, &out, true);
     let joined_in = |epoch: usize| -> Vec<String> {
-        let audit = fs::read_to_string(out.join(format!("audit_epoch{epoch}.csv"))).unwrap();
+        let audit = fs::read_to_string(out.join(format!("data/audit_epoch{epoch}.csv"))).unwrap();
         let lines = audit.lines().filter(|l| l.starts_with("joined_parts"));
         lines.map(str::to_owned).collect()
     };
@@ -163,7 +163,7 @@ fn stones_in_the_dark_are_measured_by_their_surface() {
         lost.iter().all(|s| s.carried_from.is_none()) && missed.len() >= 3,
         "{missed:?}"
     );
-    assert!(!out.join("audit_carried.csv").exists());
+    assert!(!out.join("data/audit_carried.csv").exists());
 
     let found = stones(&project, &out, true);
     let carried: Vec<&StoneRow> = found.iter().filter(|s| s.carried_from.is_some()).collect();
@@ -176,7 +176,7 @@ fn stones_in_the_dark_are_measured_by_their_surface() {
         assert!(error < 0.002, "stone {}: {error}", stone.stone_id);
         assert_eq!(stone.carried_from, Some(1));
     }
-    let audit = fs::read_to_string(out.join("audit_carried.csv")).unwrap();
+    let audit = fs::read_to_string(out.join("data/audit_carried.csv")).unwrap();
     let listed = audit
         .lines()
         .skip(1)

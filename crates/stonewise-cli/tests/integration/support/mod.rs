@@ -218,8 +218,8 @@ pub fn results(out: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
         "previous",
         "UNFINISHED.txt",
         "run.json",
-        "digests.b3",
-        "report",
+        "data/digests.b3",
+        "report.html",
     ];
     let all = contents(out, &but).into_iter();
     all.filter(|(name, _)| !name.to_string_lossy().ends_with(".partial"))

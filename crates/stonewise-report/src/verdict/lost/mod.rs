@@ -175,7 +175,7 @@ mod tests {
                 None => writeln!(csv, "100,{y},{z},,,100,0").unwrap(),
             }
         }
-        std::fs::write(folder.path().join("m3c2.csv"), csv).unwrap();
+        std::fs::write(folder.path().join("data/m3c2.csv"), csv).unwrap();
         let lost = lost_stones(&ResultSet::read_measured(folder.path(), 1).unwrap());
         (0..lost.len()).filter(|&i| lost[i]).collect()
     }

@@ -17,6 +17,7 @@ use crate::part::Part;
 use crate::pipeline::{Context, Until, first_stones, run_in};
 use crate::project::{Epoch, Project};
 use crate::results::ResultSet;
+use crate::results::names::PairFile;
 use crate::storage::store::{Keeps, StepStore};
 use crate::truth::outcome;
 use case::{Case, Method, file_name};
@@ -124,7 +125,7 @@ fn measure(
     let results = ResultSet::read(folder)?;
     let scores = { results.evaluation.as_ref() }.and_then(|e| Some([e.stones.clone()?, e.m3c2.clone()?]));
     let all = scores.ok_or_else(|| Error::Input {
-        path: folder.join("evaluation.json"),
+        path: folder.join(PairFile::Evaluation.place(1)),
         message: "holds no scores; remove its folder".to_owned(),
     })?;
     let params = &project.settings.evaluate;

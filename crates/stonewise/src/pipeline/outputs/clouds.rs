@@ -10,10 +10,8 @@ use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::measure::MEASURE;
 use crate::pipeline::until::Until;
 use crate::results::StoneRow;
-use crate::results::names::epoch_dir;
 use crate::storage::step::Key;
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::PathBuf;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::epoch::EpochId;
@@ -58,8 +56,6 @@ fn write_clouds(
     rows: Option<&[StoneRow]>,
 ) -> Result<()> {
     let epoch = &context.project.epochs[id];
-    let folder = context.out.join(epoch_dir(id.number()));
-    fs::create_dir_all(&folder).map_err(Error::io("making a folder", &folder))?;
     let names = cloud_names(id.number(), &epoch.clouds);
     let outputs: Vec<PathBuf> = names.iter().map(|name| context.out.join(name)).collect();
     let motions = rows.map_or_else(BTreeMap::new, motions);

@@ -35,7 +35,7 @@ fn write_tables(run: &Run, later: EpochId) -> Result<()> {
         observers: registered.epoch_errors.as_ref().map(ObserversRecord::from),
         deformation: registered.deformation.as_ref().map(DeformationRecord::from),
     };
-    let name = PairFile::Registration.name(later.index());
+    let name = PairFile::Registration.place(later.index());
     write_readable_json(&out.join(name), &record)?;
     match registered.neighbours.is_empty() {
         true => Ok(()),

@@ -8,6 +8,7 @@ use crate::pipeline::steps::known_motion::known_motion;
 use crate::pipeline::steps::m3c2::{M3C2, change_field, with_datum};
 use crate::pipeline::steps::measure::MEASURE;
 use crate::pipeline::until::Until;
+use crate::results::names::DATA_DIR;
 use std::sync::Arc;
 use stonewise_core::change::{ChangeField, ChangePoint};
 use stonewise_core::cloud::GridIndex;
@@ -35,7 +36,7 @@ impl Run<'_> {
             let field = with_datum(field, params, &measured.datum, registered.epoch_errors.as_ref());
             let crs = coordinate_system(context.project)?;
             context.timed("write m3c2", || {
-                write_m3c2(&context.out, later, crs.as_ref(), &field)
+                write_m3c2(&context.out.join(DATA_DIR), later, crs.as_ref(), &field)
             })?;
             self.score(later, &field)
         })

@@ -21,7 +21,7 @@ pub static EVALUATE: Step = Step {
     wanted: |until| until >= Until::Registered,
     make: |run, epoch| match &*run.evaluated(epoch)? {
         Some(evaluation) => {
-            let name = PairFile::Evaluation.name(epoch.index());
+            let name = PairFile::Evaluation.place(epoch.index());
             write_readable_json(&run.context.out.join(name), evaluation)
         }
         None => Ok(()),

@@ -24,7 +24,7 @@ pub static MATCH: Step = Step {
     cost: Some(|sizes, epoch| Cost::of(1, sizes.pair_bytes(epoch))),
     make: |run, epoch| {
         let matched = run.matched(epoch)?;
-        let name = PairFile::Matches.name(epoch.index());
+        let name = PairFile::Matches.place(epoch.index());
         write_readable_json(&run.context.out.join(name), &*matched.report)
     },
     ..Step::PLAIN
