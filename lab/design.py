@@ -51,7 +51,7 @@ def make(program, folder, kind, seed):
     params = SURVEY.format(seed=seed, scanner=SCANNERS[kind])
     (folder / "params.toml").write_text(params)
     for done, words in [
-        (survey / "stonewise.toml", ["simulate", "--params", folder / "params.toml", "--out", survey]),
+        (survey / "stonewise.toml", ["test", "simulate", "--params", folder / "params.toml", "--out", survey]),
         (design / "design.json", ["design", survey / "stonewise.toml", "--out", design]),
         (results / "run.json", ["run", survey / "stonewise.toml", "--out", results]),
     ]:

@@ -6,7 +6,7 @@
     python3 lab/panel.py 'm_*' s_ivy --out FOLDER
     python3 lab/panel.py --list
 
-Simulates walls of 3 x 2 m with `stonewise simulate`, edits the clouds (ivy, snow, a buttress,
+Simulates walls of 3 x 2 m with `stonewise test simulate`, edits the clouds (ivy, snow, a buttress,
 coarser coordinates ...), runs stonewise and prints a row of a Markdown table for each survey.
 Surveys named s_* are scans alone, those named m_* have two photos an epoch with the masks of the
 wall before the edits.
@@ -753,7 +753,7 @@ def run(survey, folder, binary):
     folder.mkdir(parents=True)
     (folder / "parameters.toml").write_text(survey.parameters())
     parameters, simulated = folder / "parameters.toml", folder / "simulated"
-    call(binary, "simulate", "--quiet", "--params", parameters, "--out", simulated)
+    call(binary, "test", "simulate", "--quiet", "--params", parameters, "--out", simulated)
     scene = read(survey, simulated)
     for edit in survey.edits:
         edit(scene)

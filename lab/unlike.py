@@ -5,7 +5,7 @@
 
 Writes a project of two epochs of a wall that stands still: `stonewise.toml`, and for each epoch a coloured cloud, six
 photos with their poses (COLMAP) and the true masks of the photos (`masks.json`, COCO). The project file does not name
-the masks; they serve to score what `stonewise segment` and `stonewise adapt` find.
+the masks; they serve to score what `stonewise detector segment` and `stonewise detector adapt` find.
 
 x points out of the wall, y along it, z up; lengths are metres. A wall is a raster of heights, colours and stones. For
 each pixel of a photo, the ray is intersected with the wall's plane and corrected four times for the height there; this

@@ -1,4 +1,4 @@
-"""Writes a trained detector as a safetensors file for `stonewise segment --model`, in half precision.
+"""Writes a trained detector as a safetensors file for `stonewise detector segment --model`, in half precision.
 
 python3 export.py MODEL.pt OUT.safetensors --backbone FILE.pth [--provenance FILE.json]
 

@@ -1,6 +1,6 @@
 """Makes boxes as a person draws them out of masks: each side 5 % of the box further out, so 10 % wider.
 
-python3 wide_boxes.py INSTANCES.json OUT.json, both COCO; then stonewise segment IMAGES --boxes OUT.json --reference INSTANCES.json
+python3 wide_boxes.py INSTANCES.json OUT.json, both COCO; then stonewise detector segment IMAGES --boxes OUT.json --reference INSTANCES.json
 """
 
 import json

@@ -17,7 +17,7 @@ from ._progress import Progress, listener
 class Detector:
     """Finds the stones of photos with Mask R-CNN.
 
-    :param model: ``"built-in"``, or a file that ``stonewise train`` wrote.
+    :param model: ``"built-in"``, or a file that ``stonewise detector train`` wrote.
     :param tiling: Keys of ``[segment.tiling]`` of the project file, such as ``min_score=0.6``.
 
     >>> import numpy as np

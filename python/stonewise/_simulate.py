@@ -18,7 +18,7 @@ def simulate(
     force: bool = False,
     **parameters: Any,
 ) -> Path:
-    """Simulates a survey of a wall with known motion, as ``stonewise simulate --params FILE --out OUT`` does, to the same bytes.
+    """Simulates a survey of a wall with known motion, as ``stonewise test simulate --params FILE --out OUT`` does, to the same bytes.
 
     :param out: Folder of the survey; made if need be.
     :param progress: As for :func:`run`.

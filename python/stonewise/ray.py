@@ -1,6 +1,6 @@
 """Runs on a cluster of machines, with Ray: ``pip install "stonewise[ray]"``.
 
-A run is cut into units of work, as ``stonewise plan`` prints them: steps, and single photos. Each unit is a task of Ray. Tasks get paths;
+A run is cut into units of work, as ``stonewise run --plan`` prints them: steps, and single photos. Each unit is a task of Ray. Tasks get paths;
 points and photos go through the results folder, which all machines must see under the same path, as they must the survey. What is done is
 noted in that folder: whatever dies, the same call goes on from there, with or without Ray. Results have the same bytes as those of
 :func:`stonewise.run`.

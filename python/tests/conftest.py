@@ -51,7 +51,7 @@ def command() -> Command:
 def survey(command: Command, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("survey")
     (folder / "params.toml").write_text(SURVEY)
-    command("simulate", "--quiet", "--params", folder / "params.toml", "--out", folder / "survey")
+    command("test", "simulate", "--quiet", "--params", folder / "params.toml", "--out", folder / "survey")
     return folder / "survey"
 
 

@@ -178,7 +178,7 @@ def test_simulated_surveys_have_the_bytes_of_the_command(command, tmp_path):
     heard = []
     project = stonewise.simulate(tmp_path / "python", progress=lambda *told: heard.append(told), **parameters)
     assert project == tmp_path / "python" / "stonewise.toml" and heard
-    command("simulate", "--quiet", "--params", project.with_name("simulation.toml"), "--out", tmp_path / "command")
+    command("test", "simulate", "--quiet", "--params", project.with_name("simulation.toml"), "--out", tmp_path / "command")
     for name in ("stonewise.toml", "epoch2/cloud_tls.laz", "epoch1/images/IMG_1001.jpg", "truth/stones.csv"):
         assert (tmp_path / "python" / name).read_bytes() == (tmp_path / "command" / name).read_bytes(), name
 

@@ -100,7 +100,7 @@ def test_the_detector_is_the_command_segment(command, survey, epochs, tmp_path):
     image = np.asarray(Image.open(photo).convert("RGB"))[150:450, 200:600]
     (tmp_path / "photos").mkdir()
     Image.fromarray(image).save(tmp_path / "photos" / "wall.png")
-    command("segment", tmp_path / "photos", "--scales", "1", "--out", tmp_path / "out")
+    command("detector", "segment", tmp_path / "photos", "--scales", "1", "--out", tmp_path / "out")
     labels = stonewise.Detector(scales=[1.0]).segment(image)
     assert labels.dtype == np.int32 and labels.shape == image.shape[:2]
     expected = np.asarray(Image.open(tmp_path / "out" / "labels" / "wall.png"))

@@ -19,7 +19,7 @@ SNAKEMAKE = shutil.which("snakemake") or shutil.which("snakemake", path=Path(sys
 def test_the_snakefile_of_the_page(command, survey, results, tmp_path):
     (snakefile,) = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.DOTALL | re.MULTILINE)
     (tmp_path / "Snakefile").write_text(snakefile)
-    command("plan", "--quiet", survey / "stonewise.toml", "--out", tmp_path / "results")
+    command("run", "--plan", "--quiet", survey / "stonewise.toml", "--out", tmp_path / "results")
     programs = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     arguments = [str(SNAKEMAKE), "--cores", "2", "--config", "out=results"]
     done = subprocess.run(

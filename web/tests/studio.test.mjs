@@ -42,7 +42,7 @@ before(async () => {
   if (!process.env["STONEWISE"]) execFileSync("cargo", ["build", "-q", "-p", "stonewise-cli"], { cwd: root, stdio: "inherit" });
   folder = mkdtempSync(join(tmpdir(), "stonewise-studio-"));
   writeFileSync(join(folder, "params.toml"), SURVEY);
-  execFileSync(program, ["simulate", "--quiet", "--params", join(folder, "params.toml"), "--out", join(folder, "made")]);
+  execFileSync(program, ["test", "simulate", "--quiet", "--params", join(folder, "params.toml"), "--out", join(folder, "made")]);
 });
 
 after(async () => {
@@ -291,7 +291,7 @@ rendered = true
 test("the detector learns from a correction, and changes nothing unseen", async () => {
   writeFileSync(join(folder, "photos.toml"), PHOTOS);
   const survey = join(folder, "taught");
-  execFileSync(program, ["simulate", "--quiet", "--params", join(folder, "photos.toml"), "--out", survey]);
+  execFileSync(program, ["test", "simulate", "--quiet", "--params", join(folder, "photos.toml"), "--out", survey]);
   const file = join(survey, "stonewise.toml");
   writeFileSync(file, readFileSync(file, "utf8").replace(/^(masks|motion) *=.*\n/gm, ""));
   execFileSync(program, ["run", "--quiet", file, "--out", join(survey, "results"), "--force"]);

@@ -22,7 +22,7 @@ use stonewise_segment::tiling::TilingOptions;
 #[serde(default, deny_unknown_fields)]
 #[schemars(transform = with_ranges::<Self>)]
 pub struct SegmentParams {
-    /// The detector: `built-in`, or a file that `stonewise train` wrote.
+    /// The detector: `built-in`, or a file that `stonewise detector train` wrote.
     pub model: PathBuf,
     /// Photos that are to show each part of the wall, among which the detector's are chosen (`photos = "auto"`
     /// of an epoch).

@@ -1,13 +1,15 @@
 //! The command line, as typed.
 
-use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
+use clap::{Args as ClapArgs, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use std::fmt::Write;
 use std::path::PathBuf;
+use stonewise::Until;
 use stonewise::experiment::Dimension;
 
-/// Measures how a masonry dam moves, stone by stone, from point clouds and posed photos.
+/// Measures how a masonry dam moves, stone by stone, from point clouds and photos.
 #[derive(Debug, Parser)]
-#[command(name = "stonewise", version, max_term_width = 110)]
+#[command(name = "stonewise", version, max_term_width = 80)]
 pub struct Args {
     /// Print errors only.
     #[arg(long, short, global = true)]
@@ -15,8 +17,8 @@ pub struct Args {
     /// Number of threads (default: all cores). Results do not depend on it.
     #[arg(long, global = true, value_name = "N")]
     pub threads: Option<usize>,
-    /// Write into a folder that already holds other files (files of the same name are replaced, inputs
-    /// never), and run a survey even where the check found an error.
+    /// Write into a folder that holds other files (never over inputs), and run a survey in spite of errors that
+    /// the check found.
     #[arg(long, global = true)]
     pub force: bool,
     /// With --version: also print commit, system, build, processor class and weights.
@@ -27,164 +29,217 @@ pub struct Args {
     pub command: Command,
 }
 
+/// Headings of the list of commands, each with its commands.
+const GROUPS: [(&str, &[&str]); 4] = [
+    ("Measure", &["init", "check", "run", "studio", "report", "demo"]),
+    ("Understand and correct", &["info", "explain", "edits", "verify"]),
+    ("Plan and judge", &["design", "evaluate"]),
+    ("More", &["compare", "detector", "test", "self"]),
+];
+
+/// The command line with its help, in which the commands stand in groups.
+pub fn command() -> clap::Command {
+    let command = Args::command();
+    let mut list = String::new();
+    for (heading, names) in GROUPS {
+        let _ = writeln!(list, "\n{heading}:");
+        for name in names {
+            let about = command.find_subcommand(name).and_then(clap::Command::get_about);
+            let about = about.map(ToString::to_string).unwrap_or_default();
+            let _ = writeln!(list, "  {name:<9} {about}");
+        }
+    }
+    command.help_template(format!(
+        "{{about}}\n\n{{usage-heading}} {{usage}}\n{list}\nOptions:\n{{options}}\n\n\
+         `stonewise COMMAND --help` explains a command, with examples."
+    ))
+}
+
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Run the whole chain, from clouds and photos, or clouds alone, to results and a report. Resumes after an interruption.
-    #[command(
-        after_help = "Examples:\n  stonewise run survey/stonewise.toml --out results/\n  \
-        stonewise run dam_2024.laz dam_2025.laz --out results/\n  \
-        stonewise run survey/stonewise.toml --out results/ --exit-on alarm\n\n\
-        Exit codes: 0 done, 1 failed, 2 wrong arguments or project file, 3 inputs left out or results in doubt, 4 verdict at or above the --exit-on level."
-    )]
-    Run(RunArgs),
-    /// Split a run into units of work that other programs do on other machines; prints them as JSON.
-    #[command(
-        after_help = "Examples:\n  stonewise plan survey/stonewise.toml --out results/ > plan.json\n  \
-        stonewise plan survey/stonewise.toml --out results/ --ids --rank 0\n\n\
-        See docs/src/units.md for Slurm, Snakemake and Ray."
-    )]
-    Plan(PlanArgs),
-    /// Do one unit of the plan in a results folder.
-    #[command(after_help = "Example:\n  stonewise unit ingest-1 --out results/")]
-    Unit(UnitArgs),
-    /// Simulate a small survey with known motion, and measure it.
-    #[command(after_help = "Examples:\n  stonewise demo\n  stonewise demo --seed 8 --out elsewhere/")]
-    Demo(DemoArgs),
-    /// Check a survey in seconds for problems with units, coordinate systems, overlap, photos, cameras and
-    /// disk space.
-    #[command(after_help = "Example:\n  stonewise check survey/stonewise.toml\n\n\
-        The table goes to stdout; a page with pictures is written into the temporary folder, or where --page says. Exit code 3 if anything is doubtful or wrong, 1 if an input cannot be read.")]
-    Check(CheckArgs),
-    /// Correct stones by hand: read edits back from QGIS or from an editor of COCO files, or check a file of
-    /// edits.
-    #[command(subcommand)]
-    Edits(EditsCommand),
-    /// Write a project file from the surveys found in a folder.
+    /// Write a project file from the surveys found in a folder
     #[command(after_help = "Example:\n  stonewise init survey/        # writes survey/stonewise.toml")]
     Init(InitArgs),
-    /// Open a page to work in: look at a survey, run it, correct its stones, read its report.
+    /// Look for mistakes in a survey, in seconds
+    #[command(
+        after_help = "Looks at units, coordinate systems, overlap, photos, cameras and disk space. The \
+        table goes to stdout; a page with pictures is written into the temporary folder, \
+        or where --page says. Exit code 3 if anything is doubtful or wrong, 1 if an input \
+        cannot be read.\n\n\
+        Example:\n  stonewise check survey/stonewise.toml"
+    )]
+    Check(CheckArgs),
+    /// Measure: from clouds and photos to results and a report
+    #[command(after_help = "An interrupted run resumes: give the same command again.\n\n\
+        Examples:\n  stonewise run survey/stonewise.toml\n  \
+        stonewise run dam_2024.laz dam_2025.laz --out results/\n  \
+        stonewise run survey/stonewise.toml --exit-on alarm\n\n\
+        Exit codes: 0 done, 1 failed, 2 wrong arguments or project file, 3 inputs left out \
+        or results in doubt, 4 verdict at or above the --exit-on level. For a run on several \
+        machines (--plan) see docs/src/units.md.")]
+    Run(RunArgs),
+    /// Work on a page in the browser: look, run, correct, read the report
     #[command(
         after_help = "Examples:\n  stonewise studio survey/\n  stonewise studio results/ --view\n\n\
         The address goes to stdout; only this machine can reach it. See docs/src/studio.md."
     )]
     Studio(StudioArgs),
-    /// Print the JSON schema of the project file, with which editors complete and explain its keys.
-    #[command(after_help = "Example:\n  stonewise schema > survey/stonewise.schema.json")]
-    Schema,
-    /// Split one epoch into two disjoint halves, to test the method against a known motion.
-    #[command(after_help = "Example:\n  stonewise split survey/stonewise.toml --seed 1 --out halves/")]
-    Split(SplitArgs),
-    /// Find the stones in photos. For a project, write one label image per photo, from its masks or from the
-    /// detector.
-    #[command(after_help = "Examples:\n  stonewise segment photos/ --out stones/\n  \
-        stonewise segment photos/ --out stones/ --model training/model.safetensors --reference masks.json\n  \
-        stonewise segment survey/stonewise.toml --out results/")]
-    Segment(SegmentArgs),
-    /// Train the stone detector: on a few labelled photos of a wall, or on rendered photos of masonry in
-    /// general.
-    #[command(
-        after_help = "Examples:\n  stonewise train --rendered --from none --minutes 60 --out training/\n\n\
-        Give the same command again to continue an interrupted training."
-    )]
-    Train(TrainArgs),
-    /// Train the detector of a project on the stones of its own survey that several photos and the cloud confirm.
-    ///
-    /// Parts of the wall are kept apart. Unless the masks of the trained detector agree significantly better there from
-    /// photo to photo, nothing changes.
-    #[command(after_help = "Example:\n  stonewise adapt survey/stonewise.toml --minutes 20")]
-    Adapt(AdaptArgs),
-    /// Transfer the labels of the photos to the point clouds.
-    #[command(after_help = "Example:\n  stonewise label survey/stonewise.toml --out results/")]
-    Label(ProjectArgs),
-    /// Find the same stones in two epochs.
-    #[command(after_help = "Example:\n  stonewise match survey/stonewise.toml --out results/")]
-    Match(ProjectArgs),
-    /// Measure the motion of every matched stone.
-    #[command(after_help = "Example:\n  stonewise register survey/stonewise.toml --out results/")]
-    Register(ProjectArgs),
-    /// Compare clouds along their normals (Lague et al. 2013).
-    #[command(
-        after_help = "Examples:\n  stonewise m3c2 survey/stonewise.toml --out results/\n  \
-        stonewise m3c2 before.laz after.laz --out results/ --params m3c2_params.txt\n  \
-        stonewise m3c2 before.laz after.laz --out results/ --recipes"
-    )]
-    M3c2(CompareArgs),
-    /// Distance from each point of the second cloud to the nearest of the first.
-    #[command(after_help = "Example:\n  stonewise c2c before.laz after.laz --out results/")]
-    C2c(CompareArgs),
-    /// Distance from each point of a cloud to a mesh.
-    #[command(after_help = "Example:\n  stonewise c2m mesh.ply cloud.laz --out results/")]
-    C2m(CompareArgs),
-    /// Score results against truth.
-    #[command(after_help = "Example:\n  stonewise evaluate results/ --truth truth/stones.csv")]
-    Evaluate(EvaluateArgs),
-    /// Write the report of a finished run again, from its result files only.
+    /// Write the report of a finished run again, or print it as PDF
     #[command(
         after_help = "Examples:\n  stonewise report results/\n  stonewise report results/ --pdf report.pdf --no-appendix"
     )]
     Report(ReportArgs),
-    /// Verify that results are those of their run: files against their digests, tables against each other, and,
-    /// with the project, inputs and all results against the same run again.
-    #[command(after_help = "Examples:\n  stonewise verify results/\n  \
-        stonewise verify results/ survey/stonewise.toml\n\n\
-        The findings go to stdout. Exit codes: 0 all holds, 1 something differs, 3 something could not be compared.")]
-    Verify(VerifyArgs),
-    /// Say what the first survey shows of the wall, and predict what the next one will see: standard deviations of every
-    /// stone, the smallest bulge that is found, what one more station gains. Before any survey: the same from a plan.
+    /// Simulate a small wall with known motion, and measure it
+    #[command(after_help = "Examples:\n  stonewise demo\n  stonewise demo --seed 8 --out elsewhere/")]
+    Demo(DemoArgs),
+    /// Describe clouds, photos, camera files, masks or projects
     #[command(
-        after_help = "Examples:\n  stonewise design survey/stonewise.toml --out design/\n  \
-        stonewise design plan.toml --out design/\n\n\
-        A project of one epoch is enough. A plan has [wall] and [[stations]]. The figures go to stdout as JSON."
+        after_help = "With --unpack-photos: unpacks the photos that scanners store in E57 files, with \
+        their cameras. The lines `images` and `cameras` for the project file go to stdout. \
+        Panoramas are cut into photos. Exit code 3 if images are left out.\n\n\
+        Examples:\n  stonewise info epoch1/cloud_tls.laz epoch1/cameras.xml\n  \
+        stonewise info --unpack-photos epoch1/scan.e57 --out epoch1/photos/"
     )]
-    Design(DesignArgs),
-    /// Certify this program on this machine: on simulated walls, and, with a project, on motions put into its own
-    /// scans.
-    #[command(after_help = "Examples:\n  stonewise certify --out certificate/\n  \
-        stonewise certify survey/stonewise.toml --seed 7 --out certificate/\n\n\
-        The figures go to stdout. Exit code 3 if one is outside what is allowed.")]
-    Certify(CertifyArgs),
-    /// Simulate a survey with known truth.
-    #[command(after_help = "Examples:\n  stonewise simulate --seed 7 --out survey/\n  \
-        stonewise simulate dam --size 40x20 --out survey/")]
-    Simulate(SimulateArgs),
-    /// Choose parameters: try every combination of a grid against a known motion.
-    #[command(
-        after_help = "Examples:\n  stonewise tune survey/stonewise.toml --out tuned/ --part 5x5\n  \
-        stonewise tune survey/stonewise.toml --out tuned/ --grid match.max_ratio=0.3..0.6..0.1 \
-        --grid registration.estimator=gicp --grid registration.gicp.buffer_m=0,0.3,0.6"
-    )]
-    Tune(TuneArgs),
-    /// Repeat the paper's experiment.
-    #[command(subcommand)]
-    Experiment(ExperimentCommand),
-    /// Describe the content of a cloud, photos, a camera file, a mask file or a project.
-    #[command(after_help = "Example:\n  stonewise info epoch1/cloud_tls.laz epoch1/cameras.xml")]
     Info(InfoArgs),
-    /// Unpack the photos that scanners store in E57 files, with their cameras, for use in a project.
-    #[command(
-        after_help = "Example:\n  stonewise photos epoch1/scan.e57 --out epoch1/photos/\n\n\
-        The summary goes to stdout, with the lines `images` and `cameras` for the project file. Panoramas are cut into photos. Exit code 3 if images are left out."
-    )]
-    Photos(PhotosArgs),
-    /// Explain the code of a message: what was seen, what it means, what to do.
+    /// Explain the code of a message, and say what to do
     #[command(
         after_help = "Examples:\n  stonewise explain not-converged\n  stonewise explain        lists the codes"
     )]
     Explain(ExplainArgs),
-    /// Say what this machine offers and which parts of stonewise it can run.
-    #[command(after_help = "Example:\n  stonewise doctor")]
-    Doctor,
-    /// Print the completions of a shell.
+    /// Correct stones by hand, with edits from QGIS or COCO files
+    #[command(subcommand)]
+    Edits(EditsCommand),
+    /// Verify that results are those of their run
     #[command(
-        after_help = "Examples:\n  stonewise completions bash > ~/.local/share/bash-completion/completions/stonewise\n  \
-        stonewise completions zsh > ~/.zfunc/_stonewise\n  \
-        stonewise completions fish > ~/.config/fish/completions/stonewise.fish"
+        after_help = "Compares files with their digests and tables with each other, and, with the \
+        project, inputs and all results with the same run again. The findings go to \
+        stdout. Exit codes: 0 all holds, 1 something differs, 3 something could not be \
+        compared.\n\n\
+        Examples:\n  stonewise verify results/\n  stonewise verify results/ survey/stonewise.toml"
+    )]
+    Verify(VerifyArgs),
+    /// Predict what the next survey will see; plan the first one
+    #[command(
+        after_help = "Says what the first survey shows of the wall: standard deviations of every stone, the \
+        smallest bulge that is found, what one more station gains. Before any survey it \
+        says the same from a plan, which has [wall] and [[stations]]. A project of one epoch \
+        is enough. The figures go to stdout as JSON.\n\n\
+        Examples:\n  stonewise design survey/stonewise.toml --out design/\n  \
+        stonewise design plan.toml --out design/"
+    )]
+    Design(DesignArgs),
+    /// Score results against a table of the true motions
+    #[command(after_help = "Example:\n  stonewise evaluate results/ --truth truth/stones.csv")]
+    Evaluate(EvaluateArgs),
+    /// Compare clouds without stones: m3c2, c2c, c2m
+    #[command(subcommand)]
+    Compare(CompareCommand),
+    /// Find stones in photos; learn from a wall: segment, train, adapt
+    #[command(subcommand)]
+    Detector(DetectorCommand),
+    /// Test the method: simulate, split, certify, tune, experiment
+    #[command(subcommand)]
+    Test(TestCommand),
+    /// About this program: schema, completions, man, doctor
+    #[command(subcommand, name = "self")]
+    Itself(SelfCommand),
+}
+
+/// Comparisons of clouds without stones.
+#[derive(Debug, Subcommand)]
+pub enum CompareCommand {
+    /// Distances along the normals of the first cloud (Lague et al. 2013)
+    #[command(
+        after_help = "Examples:\n  stonewise compare m3c2 survey/stonewise.toml --out results/\n  \
+        stonewise compare m3c2 before.laz after.laz --params m3c2_params.txt\n  \
+        stonewise compare m3c2 before.laz after.laz --recipes"
+    )]
+    M3c2(CompareArgs),
+    /// Distance from each point of the second cloud to the nearest of the first
+    #[command(after_help = "Example:\n  stonewise compare c2c before.laz after.laz")]
+    C2c(CompareArgs),
+    /// Distance from each point of a cloud to a mesh
+    #[command(after_help = "Example:\n  stonewise compare c2m mesh.ply cloud.laz")]
+    C2m(CompareArgs),
+}
+
+/// What to do with the detector.
+#[derive(Debug, Subcommand)]
+pub enum DetectorCommand {
+    /// Find the stones in photos, or write the label images of a project
+    #[command(
+        after_help = "Examples:\n  stonewise detector segment photos/ --out stones/\n  \
+        stonewise detector segment photos/ --model training/model.safetensors --reference masks.json\n  \
+        stonewise detector segment survey/stonewise.toml --out results/"
+    )]
+    Segment(SegmentArgs),
+    /// Train on a few labelled photos of a wall, or on rendered photos
+    #[command(
+        after_help = "Example:\n  stonewise detector train --rendered --from none --minutes 60 --out training/\n\n\
+        Give the same command again to continue an interrupted training."
+    )]
+    Train(TrainArgs),
+    /// Train on the stones of a project that photos and cloud confirm
+    #[command(
+        after_help = "Parts of the wall are kept apart. Unless the masks of the trained detector agree \
+        significantly better there from photo to photo, nothing changes.\n\n\
+        Example:\n  stonewise detector adapt survey/stonewise.toml --minutes 20"
+    )]
+    Adapt(AdaptArgs),
+}
+
+/// Tests of the method.
+#[derive(Debug, Subcommand)]
+pub enum TestCommand {
+    /// Simulate a survey with known truth
+    #[command(
+        after_help = "Examples:\n  stonewise test simulate --seed 7 --out survey/\n  \
+        stonewise test simulate dam --size 40x20 --out survey/"
+    )]
+    Simulate(SimulateArgs),
+    /// Split one survey into two halves, to put a known motion into one of them
+    #[command(after_help = "Example:\n  stonewise test split survey/stonewise.toml --seed 1 --out halves/")]
+    Split(SplitArgs),
+    /// Certify this program on this machine, on simulated walls and own scans
+    #[command(after_help = "Examples:\n  stonewise test certify --out certificate/\n  \
+        stonewise test certify survey/stonewise.toml --seed 7 --out certificate/\n\n\
+        The figures go to stdout. Exit code 3 if one is outside what is allowed.")]
+    Certify(CertifyArgs),
+    /// Choose parameters: try every combination of a grid against a known motion
+    #[command(
+        after_help = "Examples:\n  stonewise test tune survey/stonewise.toml --out tuned/ --part 5x5\n  \
+        stonewise test tune survey/stonewise.toml --grid match.max_ratio=0.3..0.6..0.1 \
+        --grid registration.estimator=gicp --grid registration.gicp.buffer_m=0,0.3,0.6"
+    )]
+    Tune(TuneArgs),
+    /// Repeat the paper's experiment
+    #[command(subcommand)]
+    Experiment(ExperimentCommand),
+}
+
+/// What belongs to the program itself.
+#[derive(Debug, Subcommand)]
+pub enum SelfCommand {
+    /// Print the JSON schema of the project file
+    #[command(
+        after_help = "Editors complete and explain the keys of a project file with it.\n\n\
+        Example:\n  stonewise self schema > survey/stonewise.schema.json"
+    )]
+    Schema,
+    /// Print the completions of a shell
+    #[command(
+        after_help = "Examples:\n  stonewise self completions bash > ~/.local/share/bash-completion/completions/stonewise\n  \
+        stonewise self completions zsh > ~/.zfunc/_stonewise\n  \
+        stonewise self completions fish > ~/.config/fish/completions/stonewise.fish"
     )]
     Completions(CompletionsArgs),
-    /// Write the man pages, one for each command.
-    #[command(after_help = "Example:\n  stonewise man --out ~/.local/share/man/man1")]
+    /// Write the man pages, one for each command
+    #[command(after_help = "Example:\n  stonewise self man --out ~/.local/share/man/man1")]
     Man(ManArgs),
+    /// Say what this machine offers and which parts of stonewise it can run
+    #[command(after_help = "Example:\n  stonewise self doctor")]
+    Doctor,
 }
 
 /// Arguments of `explain`.
@@ -222,58 +277,65 @@ pub struct StudioArgs {
 #[derive(Debug, ClapArgs)]
 pub struct ManArgs {
     /// Folder of the man pages; created if missing.
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
-}
-
-/// A project and a folder for its results.
-#[derive(Debug, ClapArgs)]
-pub struct ProjectArgs {
-    /// The project file.
-    pub project: PathBuf,
-    /// Folder of the results; created if missing.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = "man")]
     pub out: PathBuf,
 }
 
 /// Arguments of `run`.
 #[derive(Debug, ClapArgs)]
 pub struct RunArgs {
-    /// The project file; or scans without photos, one for each epoch in order of time, for which a project file
+    /// The project file; or scans without photos, one for each survey in order of time, for which a project file
     /// is written into the folder of the results.
     #[arg(required = true, value_name = "PROJECT|SCANS")]
     pub inputs: Vec<PathBuf>,
     /// Folder of the results; created if missing.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = "results")]
     pub out: PathBuf,
-    /// Exit with code 4 if the verdict is this state or worse, and with 3 if the results allow no verdict.
-    #[arg(long, value_enum, value_name = "STATE")]
+    /// Stop after this step: `segment` finds stones in the photos, `label` in the clouds, `match` the same stones in
+    /// all surveys, `register` measures them.
+    #[arg(long, value_enum, value_name = "STEP", hide_possible_values = true)]
+    pub until: Option<Step>,
+    /// Exit with code 4 if the verdict is this state, `attention` or `alarm`, or worse, and with 3 if the results
+    /// allow no verdict.
+    #[arg(long, value_enum, value_name = "STATE", hide_possible_values = true)]
     pub exit_on: Option<ExitOn>,
-}
-
-/// Arguments of `plan`.
-#[derive(Debug, ClapArgs)]
-pub struct PlanArgs {
-    /// The project and the folder of its results.
-    #[command(flatten)]
-    pub project: ProjectArgs,
-    /// Print only the names of the units that are not done, one a line.
-    #[arg(long)]
+    /// Only print the units of work that other programs do on other machines, as JSON.
+    #[arg(long, conflicts_with_all = ["until", "exit_on"])]
+    pub plan: bool,
+    /// With --plan: print only the names of the units that are not done, one a line.
+    #[arg(long, hide = true, requires = "plan")]
     pub ids: bool,
-    /// Only units of this rank: they need units of lower ranks only.
-    #[arg(long, value_name = "N", requires = "ids")]
+    /// With --ids: only units of this rank; they need units of lower ranks only.
+    #[arg(long, hide = true, value_name = "N", requires = "ids")]
     pub rank: Option<usize>,
+    /// Do one unit of the plan in the folder of the results: the input is its name.
+    #[arg(long, hide = true, conflicts_with_all = ["until", "exit_on", "plan"])]
+    pub unit: bool,
 }
 
-/// Arguments of `unit`.
-#[derive(Debug, ClapArgs)]
-pub struct UnitArgs {
-    /// The unit's name in the plan.
-    #[arg(value_name = "ID")]
-    pub unit: String,
-    /// Folder of the results, in which the plan was made.
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
+/// Steps after which a run can stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Step {
+    /// Stones in the photos.
+    Segment,
+    /// Stones in the clouds.
+    Label,
+    /// The same stones in all epochs.
+    Match,
+    /// Their motions.
+    Register,
+}
+
+impl Step {
+    /// How far a run goes to do it.
+    pub fn until(self) -> Until {
+        match self {
+            Self::Segment => Until::Segmented,
+            Self::Label => Until::Labelled,
+            Self::Match => Until::Matched,
+            Self::Register => Until::Registered,
+        }
+    }
 }
 
 /// Verdicts that can end a run with an exit code of their own.
@@ -320,7 +382,7 @@ pub struct EditsImportArgs {
     /// The edited stones.gpkg, or a COCO file (.json).
     pub source: PathBuf,
     /// The file of edits.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", default_value = "edits.json")]
     pub out: PathBuf,
     /// Put the new edits after those that the file has.
     #[arg(long)]
@@ -363,7 +425,7 @@ pub struct DemoArgs {
 /// Arguments of `init`.
 #[derive(Debug, ClapArgs)]
 pub struct InitArgs {
-    /// Folder with one subfolder per epoch, or with one scan per epoch.
+    /// Folder with one subfolder for each survey, or with one scan for each.
     pub dir: PathBuf,
 }
 
@@ -379,7 +441,7 @@ pub struct SplitArgs {
     #[arg(long, value_name = "NAME")]
     pub epoch: Option<String>,
     /// Folder of the new project; created if missing.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = "halves")]
     pub out: PathBuf,
 }
 
@@ -390,7 +452,7 @@ pub struct CompareArgs {
     #[arg(num_args = 1..=2, required = true, value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,
     /// Folder of the results; created if missing.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = "compared")]
     pub out: PathBuf,
     /// M3C2 parameter file saved by CloudCompare (only for m3c2 of two clouds).
     #[arg(long, value_name = "FILE")]
@@ -409,9 +471,9 @@ pub struct SegmentArgs {
     /// A folder of photos, one photo, or a project file (its own parameters apply; of the options below,
     /// only --out can be used with it).
     pub input: PathBuf,
-    /// Folder of the results; created if missing.
+    /// Folder of the results; created if missing [default: stones; of a project: results].
     #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
+    pub out: Option<PathBuf>,
     /// The detector: `built-in` (default), or a file that `train` wrote.
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
@@ -452,7 +514,7 @@ pub struct TrainArgs {
     #[arg(long, value_name = "WEIGHTS", default_value = "built-in")]
     pub from: PathBuf,
     /// Folder of the checkpoint, the curves and the trained detector (model.safetensors); created if missing.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = "training")]
     pub out: PathBuf,
     /// Stop after this many minutes; the same command continues.
     #[arg(long, value_name = "M")]
@@ -566,7 +628,7 @@ pub struct PaperArgs {
     #[arg(value_name = "SURVEY")]
     pub surveys: Vec<String>,
     /// Folder of the page, the tables and the steps; created if missing.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = "paper")]
     pub out: PathBuf,
     /// Name of the epoch to split (default: the first).
     #[arg(long, value_name = "NAME")]
@@ -596,14 +658,15 @@ pub enum Preset {
 /// Arguments of `simulate`.
 #[derive(Debug, ClapArgs)]
 pub struct SimulateArgs {
-    /// What to simulate if no parameter file is given.
-    #[arg(value_enum, default_value_t = Preset::Section)]
+    /// What to simulate if no parameter file is given: a small `section`, or a curved `dam` of any size with several
+    /// stations, lidar and photos from a drone.
+    #[arg(value_enum, default_value_t = Preset::Section, hide_possible_values = true)]
     pub preset: Preset,
     /// Width and height of a dam, metres; up to 200x27.7.
     #[arg(long, value_name = "WxH", default_value = "10x5", value_parser = parse_size)]
     pub size: [f64; 2],
     /// Folder of the survey; created if missing.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = "survey")]
     pub out: PathBuf,
     /// Parameters of the simulation (TOML, every key optional); those used are written to simulation.toml in
     /// the folder.
@@ -621,7 +684,7 @@ pub struct TuneArgs {
     /// is moved.
     pub project: PathBuf,
     /// Folder of the table, the plot and the steps; created if missing.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = "tuned")]
     pub out: PathBuf,
     /// A parameter and its values, key=a,b,c or key=from..to..step; may be repeated. Default: ratio
     /// threshold, area ratio and buffer, as in the paper (with the adjustment, border_noises instead of the
@@ -637,26 +700,26 @@ pub struct TuneArgs {
     pub seed: u64,
 }
 
-/// Arguments of `photos`.
-#[derive(Debug, ClapArgs)]
-pub struct PhotosArgs {
-    /// E57 files, whose photos share one folder and one camera file.
-    #[arg(required = true, value_name = "SCAN")]
-    pub scans: Vec<PathBuf>,
-    /// Folder for the photos (in images/) and their cameras (in colmap/); created if missing.
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
-}
-
 /// Arguments of `info`.
 #[derive(Debug, ClapArgs)]
 pub struct InfoArgs {
     /// Files or folders.
     #[arg(required = true)]
     pub paths: Vec<PathBuf>,
-    /// Print a JSON list instead, an object for each path
+    /// Print a JSON list instead, an object for each path.
     #[arg(long)]
     pub json: bool,
+    /// Unpack the photos of these E57 files, which share one folder and one camera file.
+    #[arg(long, conflicts_with = "json")]
+    pub unpack_photos: bool,
+    /// Folder for the photos (in images/) and their cameras (in colmap/); created if missing.
+    #[arg(
+        long,
+        value_name = "DIR",
+        requires = "unpack_photos",
+        default_value = "photos"
+    )]
+    pub out: PathBuf,
 }
 
 /// Reads `WIDTHxHEIGHT`, metres.

@@ -6,12 +6,12 @@ use std::ffi::OsString;
 const GONE: [(&str, &str); 3] = [
     (
         "sensitivity",
-        "`experiment sensitivity` is gone: simulate a survey with each value (`stonewise simulate --params FILE`, the \
+        "`experiment sensitivity` is gone: simulate a survey with each value (`stonewise test simulate --params FILE`, the \
          spacing is `spacing_m` in [scene.tls]), then `stonewise run` it and `stonewise evaluate --truth` the results",
     ),
     (
         "--train-minutes",
-        "`--train-minutes` is gone: train the detector first (`stonewise train --data MASKS --images PHOTOS`), then name it \
+        "`--train-minutes` is gone: train the detector first (`stonewise detector train --data MASKS --images PHOTOS`), then name it \
          in the project file ([segment] model) and leave out `masks`",
     ),
     (
@@ -39,9 +39,9 @@ mod tests {
             instead(&words)
         };
         let sensitivity = said("stonewise experiment sensitivity --out curves").unwrap();
-        assert!(sensitivity.contains("stonewise simulate"), "{sensitivity}");
+        assert!(sensitivity.contains("stonewise test simulate"), "{sensitivity}");
         let trained = said("stonewise experiment paper --train-minutes=4 --out paper").unwrap();
-        assert!(trained.contains("stonewise train"), "{trained}");
+        assert!(trained.contains("stonewise detector train"), "{trained}");
         assert_eq!(said("stonewise run sensitivity.toml"), None);
     }
 }

@@ -14,10 +14,12 @@ mod counted;
 mod gone;
 mod note;
 mod printer;
+mod renamed;
 mod screen;
 mod stdout;
 mod steps;
 
+use clap::FromArgMatches;
 use clap::error::ErrorKind;
 pub use commands::{measure, simulate_survey};
 use std::ffi::OsString;
@@ -37,8 +39,15 @@ const VERDICT: u8 = 4;
 /// Runs the command of these arguments, the first of which is the program's name; returns the exit code.
 pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> u8 {
     say_panics_once();
-    let words: Vec<OsString> = args.into_iter().collect();
-    let args = match <args::Args as clap::Parser>::try_parse_from(&words) {
+    let mut words: Vec<OsString> = args.into_iter().collect();
+    if let Some((present, said)) = renamed::renamed(&words) {
+        if !words.iter().any(|word| word == "--quiet" || word == "-q") {
+            note::note(&said);
+        }
+        words = present;
+    }
+    let parsed = args::command().try_get_matches_from(&words);
+    let args = match parsed.and_then(|matches| args::Args::from_arg_matches(&matches)) {
         Ok(args) => args,
         Err(error) => {
             // A closed stream is no reason to fail.

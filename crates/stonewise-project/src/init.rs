@@ -51,7 +51,7 @@ const NAMES: usize = 4;
 /// The first lines of a project file. Editors read the first one.
 const HEAD: &str = "#:schema ./stonewise.schema.json
 # Paths are relative to this file. Editors complete and explain all keys once the schema is beside this file:
-# stonewise schema > stonewise.schema.json
+# stonewise self schema > stonewise.schema.json
 ";
 
 /// Writes `dir/stonewise.toml`: one epoch for each folder of `dir` that holds a cloud in it or below, else for

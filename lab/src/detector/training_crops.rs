@@ -1,5 +1,5 @@
 //! Rendered photos as files, for the training in `lab/detector`: `training-crops DIR FIRST COUNT [SIDE]`, with
-//! FIRST and COUNT of the photos of `stonewise train --rendered` with relief.
+//! FIRST and COUNT of the photos of `stonewise detector train --rendered` with relief.
 //!
 //! Three PNG files a photo: `N.photo.png`; `N.labels.png`, whose bits 0 to 14 are the stone (0 = none) and whose
 //! bit 15 is set where nothing is known; `N.relief.png` where the photo has relief, of whose channels the first

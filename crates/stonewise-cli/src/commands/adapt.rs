@@ -1,4 +1,4 @@
-//! `adapt`.
+//! `detector adapt`.
 
 use crate::args::AdaptArgs;
 use crate::commands::Outcome;

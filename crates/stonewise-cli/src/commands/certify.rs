@@ -1,4 +1,4 @@
-//! `certify`.
+//! `test certify`.
 
 use crate::args::CertifyArgs;
 use crate::commands::Outcome;

@@ -1,6 +1,6 @@
-//! `m3c2`, `c2c` and `c2m`: clouds without stones.
+//! `compare`: clouds without stones.
 
-use crate::args::CompareArgs;
+use crate::args::{CompareArgs, CompareCommand};
 use crate::commands::Outcome;
 use crate::printer::Printer;
 use anyhow::{Context, Result, bail};
@@ -10,8 +10,17 @@ use stonewise::results::names::DATA_DIR;
 use stonewise::{Comparison, OutputFolder, Owner, Project, compare_clouds};
 use stonewise_core::change::{M3c2Params, params_from_cloudcompare};
 
+/// Compares the clouds of a project, two clouds, or a cloud and a mesh.
+pub fn compare(which: &CompareCommand, force: bool, printer: &Printer) -> Result<Outcome> {
+    match which {
+        CompareCommand::M3c2(args) => m3c2(args, force, printer),
+        CompareCommand::C2c(args) => c2c(args, force, printer),
+        CompareCommand::C2m(args) => c2m(args, force, printer),
+    }
+}
+
 /// M3C2 of a project or of two clouds.
-pub fn m3c2(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome> {
+fn m3c2(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let params = args.params.as_deref().map(cloudcompare_params).transpose()?;
     let mut project = project(args, params.clone().unwrap_or_default())?;
     if let Some(params) = params {
@@ -20,32 +29,32 @@ pub fn m3c2(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcom
     let what = Comparison::M3c2 {
         recipes: args.recipes,
     };
-    compare(&project, what, args, force, printer)
+    compare_as(&project, what, args, force, printer)
 }
 
 /// C2C of a project or of two clouds.
-pub fn c2c(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome> {
+fn c2c(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let what = Comparison::C2c {
         max_m: args.max_distance,
     };
     let project = project(args, M3c2Params::default())?;
-    compare(&project, what, args, force, printer)
+    compare_as(&project, what, args, force, printer)
 }
 
 /// C2M of a mesh and a cloud.
-pub fn c2m(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome> {
+fn c2m(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let [mesh, cloud] = args.inputs.as_slice() else {
-        bail!("c2m needs a mesh and a cloud: stonewise c2m mesh.ply cloud.laz --out DIR");
+        bail!("c2m needs a mesh and a cloud: stonewise compare c2m mesh.ply cloud.laz");
     };
     let project = Project::of_clouds(mesh, cloud, M3c2Params::default());
     let what = Comparison::C2m {
         mesh,
         max_m: args.max_distance,
     };
-    compare(&project, what, args, force, printer)
+    compare_as(&project, what, args, force, printer)
 }
 
-fn compare(
+fn compare_as(
     project: &Project,
     what: Comparison,
     args: &CompareArgs,

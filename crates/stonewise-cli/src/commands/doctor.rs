@@ -1,4 +1,4 @@
-//! `doctor`.
+//! `self doctor`.
 
 use crate::commands::Outcome;
 use crate::stdout::stdout;

@@ -1,4 +1,4 @@
-//! `experiment`.
+//! `test experiment`.
 
 use crate::args::{ExperimentCommand, PaperArgs};
 use crate::commands::{Outcome, part::part, simulate};

@@ -30,7 +30,7 @@ mod units;
 mod verify;
 mod version;
 
-use crate::args::{Args, Command};
+use crate::args::{Args, Command, DetectorCommand, SelfCommand, TestCommand};
 use crate::printer::Printer;
 use anyhow::{Context, Result};
 pub use outcome::Outcome;
@@ -38,7 +38,7 @@ pub use run::measure;
 pub use simulate::simulate_survey;
 use std::error::Error;
 use std::num::NonZero;
-use stonewise::{Until, require_start};
+use stonewise::require_start;
 pub use version::version_details;
 
 /// Runs the command that the arguments name.
@@ -50,39 +50,34 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
     start_threads(args.threads)?;
 
     match args.command {
-        Command::Run(args) => run::run_all(&args, force, printer),
-        Command::Plan(args) => units::plan(&args, force, printer),
-        Command::Unit(args) => units::unit(&args, printer),
-        Command::Segment(args) => segment::segment(args, force, printer),
-        Command::Train(args) => train::train(&args, force, printer),
-        Command::Adapt(args) => adapt::adapt(&args, force, printer),
-        Command::Label(args) => run::run(&args, Until::Labelled, force, printer),
-        Command::Match(args) => run::run(&args, Until::Matched, force, printer),
-        Command::Register(args) => run::run(&args, Until::Registered, force, printer),
-        Command::M3c2(args) => compare::m3c2(&args, force, printer),
-        Command::C2c(args) => compare::c2c(&args, force, printer),
-        Command::C2m(args) => compare::c2m(&args, force, printer),
-        Command::Evaluate(args) => evaluate::evaluate(&args, printer),
-        Command::Report(args) => report::report(&args, force, printer),
-        Command::Verify(args) => verify::verify(&args, printer),
-        Command::Design(args) => design::design(&args, force, printer),
-        Command::Certify(args) => certify::certify(&args, force, printer),
-        Command::Demo(args) => simulate::demo(&args, force, printer),
-        Command::Simulate(args) => simulate::simulate(&args, force, printer),
-        Command::Split(args) => split::split(&args, force, printer),
-        Command::Tune(args) => tune::tune(&args, force, printer),
-        Command::Experiment(which) => experiment::experiment(&which, force, printer),
-        Command::Check(args) => check::check(&args, force, printer),
-        Command::Edits(which) => edits::edits(&which, printer),
         Command::Init(args) => init::init(&args),
+        Command::Check(args) => check::check(&args, force, printer),
+        Command::Run(args) if args.plan => units::plan(&args, force, printer),
+        Command::Run(args) if args.unit => units::unit(&args, printer),
+        Command::Run(args) => run::run(&args, force, printer),
         Command::Studio(args) => studio::studio(&args, printer),
-        Command::Schema => schema::schema(),
-        Command::Photos(args) => photos::photos(&args, force, printer),
+        Command::Report(args) => report::report(&args, force, printer),
+        Command::Demo(args) => simulate::demo(&args, force, printer),
+        Command::Info(args) if args.unpack_photos => photos::photos(&args, force, printer),
         Command::Info(args) => info::info(&args),
         Command::Explain(args) => explain::explain(&args),
-        Command::Doctor => doctor::doctor(),
-        Command::Completions(args) => completions::completions(&args),
-        Command::Man(args) => completions::man(&args, force),
+        Command::Edits(which) => edits::edits(&which, printer),
+        Command::Verify(args) => verify::verify(&args, printer),
+        Command::Design(args) => design::design(&args, force, printer),
+        Command::Evaluate(args) => evaluate::evaluate(&args, printer),
+        Command::Compare(which) => compare::compare(&which, force, printer),
+        Command::Detector(DetectorCommand::Segment(args)) => segment::segment(args, force, printer),
+        Command::Detector(DetectorCommand::Train(args)) => train::train(&args, force, printer),
+        Command::Detector(DetectorCommand::Adapt(args)) => adapt::adapt(&args, force, printer),
+        Command::Test(TestCommand::Simulate(args)) => simulate::simulate(&args, force, printer),
+        Command::Test(TestCommand::Split(args)) => split::split(&args, force, printer),
+        Command::Test(TestCommand::Certify(args)) => certify::certify(&args, force, printer),
+        Command::Test(TestCommand::Tune(args)) => tune::tune(&args, force, printer),
+        Command::Test(TestCommand::Experiment(which)) => experiment::experiment(&which, force, printer),
+        Command::Itself(SelfCommand::Schema) => schema::schema(),
+        Command::Itself(SelfCommand::Completions(args)) => completions::completions(&args),
+        Command::Itself(SelfCommand::Man(args)) => completions::man(&args, force),
+        Command::Itself(SelfCommand::Doctor) => doctor::doctor(),
     }
 }
 

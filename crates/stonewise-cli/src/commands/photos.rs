@@ -1,6 +1,6 @@
-//! `photos`.
+//! `info --unpack-photos`.
 
-use crate::args::PhotosArgs;
+use crate::args::InfoArgs;
 use crate::commands::Outcome;
 use crate::counted::counted;
 use crate::printer::Printer;
@@ -16,15 +16,15 @@ use stonewise_io::cameras::{
 };
 
 /// Unpacks the photos that E57 files hold.
-pub fn photos(args: &PhotosArgs, force: bool, printer: &Printer) -> Result<Outcome> {
-    let counts = require_e57_photos(&args.scans).map_err(Error::from)?;
-    let owner = Owner::inputs("photos", &args.scans);
+pub fn photos(args: &InfoArgs, force: bool, printer: &Printer) -> Result<Outcome> {
+    let counts = require_e57_photos(&args.paths).map_err(Error::from)?;
+    let owner = Owner::inputs("photos", &args.paths);
     let written = [E57_IMAGES_DIR, E57_CAMERAS_DIR, "work"];
-    let folder = OutputFolder::of_inputs(&args.out, &owner, &args.scans, &written, force)?;
+    let folder = OutputFolder::of_inputs(&args.out, &owner, &args.paths, &written, force)?;
     for path in &counts.without {
         printer.log(&format!("note: no images in the file: {}", path.display()));
     }
-    let photos = unpack_e57_photos::<Error>(&args.scans, folder.path(), printer)?;
+    let photos = unpack_e57_photos::<Error>(&args.paths, folder.path(), printer)?;
     printer.finish();
     write!(stdout(), "{}", summary(&photos, &args.out))?;
     Ok(if photos.left_out.is_empty() {

@@ -1,6 +1,6 @@
-//! `run`, and the steps of it.
+//! `run`.
 
-use crate::args::{ExitOn, ProjectArgs, RunArgs};
+use crate::args::{ExitOn, RunArgs, Step};
 use crate::commands::Outcome;
 use crate::counted::counted;
 use crate::note::note;
@@ -14,7 +14,7 @@ use stonewise::{OutputFolder, PREVIOUS_DIR, PROJECT_STEP, Project, ScansProject,
 use stonewise_core::progress::Progress;
 
 /// Runs a whole project; with `--exit-on` the verdict decides the exit code.
-pub fn run_all(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome> {
+pub fn run(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let (project, folder) = match args.inputs.as_slice() {
         [project] if !is_scan(project) => {
             let project = Project::read(project)?;
@@ -28,8 +28,12 @@ pub fn run_all(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome
             (scans.project, folder)
         }
     };
-    let (outcome, summary) = run_to(&folder, &project, Until::Reported, printer)?;
-    conclude(&summary, folder.path(), printer);
+    let until = args.until.map_or(Until::Reported, Step::until);
+    let (outcome, summary) = run_to(&folder, &project, until, printer)?;
+    match until {
+        Until::Reported => conclude(&summary, folder.path(), printer),
+        _ => say_verdict(&summary, printer),
+    }
     let state = summary.verdict.as_ref().map(|v| v.state);
     Ok(match (args.exit_on, state) {
         (Some(_), Some(State::Alarm)) | (Some(ExitOn::Attention), Some(State::Attention)) => Outcome::Verdict,
@@ -38,10 +42,10 @@ pub fn run_all(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome
     })
 }
 
-/// Runs a project up to the step `until`.
-pub fn run(args: &ProjectArgs, until: Until, force: bool, printer: &Printer) -> Result<Outcome> {
-    let project = Project::read(&args.project)?;
-    let folder = OutputFolder::of_project(&args.out, &project, force)?;
+/// Runs the project of a file up to the step `until`.
+pub fn run_project(file: &Path, out: &Path, until: Until, force: bool, printer: &Printer) -> Result<Outcome> {
+    let project = Project::read(file)?;
+    let folder = OutputFolder::of_project(out, &project, force)?;
     let (outcome, summary) = run_to(&folder, &project, until, printer)?;
     say_verdict(&summary, printer);
     Ok(outcome)

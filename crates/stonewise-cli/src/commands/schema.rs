@@ -1,4 +1,4 @@
-//! `schema`.
+//! `self schema`.
 
 use crate::commands::Outcome;
 use crate::stdout::stdout;

@@ -1,6 +1,6 @@
-//! `segment`.
+//! `detector segment`.
 
-use crate::args::{ProjectArgs, SegmentArgs};
+use crate::args::SegmentArgs;
 use crate::commands::{Outcome, run};
 use crate::counted::counted;
 use crate::printer::Printer;
@@ -55,12 +55,10 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
         .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
     {
         refuse_options(&args)?;
-        let project = ProjectArgs {
-            project: args.input,
-            out: args.out,
-        };
-        return run::run(&project, Until::Segmented, force, printer);
+        let out = args.out.unwrap_or_else(|| "results".into());
+        return run::run_project(&args.input, &out, Until::Segmented, force, printer);
     }
+    let out = args.out.unwrap_or_else(|| "stones".into());
 
     let mut tiling = TilingOptions::default();
     tiling.scales = args.scales.unwrap_or(tiling.scales);
@@ -75,13 +73,7 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
     };
     let inputs = [args.input.clone()];
     let written = ["labels", "overlays", "masks.json", "evaluation.json", "work"];
-    let folder = OutputFolder::of_inputs(
-        &args.out,
-        &Owner::inputs("stones", &inputs),
-        &inputs,
-        &written,
-        force,
-    )?;
+    let folder = OutputFolder::of_inputs(&out, &Owner::inputs("stones", &inputs), &inputs, &written, force)?;
 
     let summary = segment_folder(
         &FolderJob {
@@ -103,7 +95,7 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
         "{} in {}; look at {}",
         counted(summary.stones, "stone"),
         counted(summary.photos, "photo"),
-        args.out.join("overlays").display()
+        out.join("overlays").display()
     ));
     if let Some(evaluation) = &summary.evaluation {
         write!(stdout(), "{}", table(evaluation))?;

@@ -1,4 +1,4 @@
-//! `simulate` and `demo`.
+//! `test simulate` and `demo`.
 
 use crate::args::{DemoArgs, Preset, SimulateArgs};
 use crate::commands::parameters::in_file;

@@ -1,4 +1,4 @@
-//! `split`.
+//! `test split`.
 
 use crate::args::SplitArgs;
 use crate::commands::Outcome;

@@ -1,4 +1,4 @@
-//! `train`.
+//! `detector train`.
 
 use crate::args::TrainArgs;
 use crate::commands::Outcome;

@@ -1,4 +1,4 @@
-//! `tune`.
+//! `test tune`.
 
 use crate::args::TuneArgs;
 use crate::commands::{Outcome, part::part};

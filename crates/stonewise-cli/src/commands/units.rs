@@ -1,19 +1,21 @@
-//! `plan` and `unit`: a run in pieces, for other programs to spread over machines.
+//! `run --plan` and `run --unit`: a run in pieces, for other programs to spread over machines.
 
-use crate::args::{PlanArgs, UnitArgs};
+use crate::args::RunArgs;
 use crate::commands::Outcome;
 use crate::commands::run::{conclude, outcome_of, tell, tell_of_project};
 use crate::counted::counted;
 use crate::printer::Printer;
 use crate::stdout::stdout;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use serde_json::Map;
 use std::io::Write;
 
 /// Plans the units of a project and prints them.
-pub fn plan(args: &PlanArgs, force: bool, printer: &Printer) -> Result<Outcome> {
-    let (project, out) = (&args.project.project, &args.project.out);
-    let coordinator = stonewise::plan(project, &Map::new(), out, force, printer)?;
+pub fn plan(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome> {
+    let [project] = args.inputs.as_slice() else {
+        bail!("--plan needs one project file");
+    };
+    let coordinator = stonewise::plan(project, &Map::new(), &args.out, force, printer)?;
     printer.finish();
     let plan = &coordinator.plan;
     let text = match args.ids {
@@ -36,11 +38,15 @@ pub fn plan(args: &PlanArgs, force: bool, printer: &Printer) -> Result<Outcome> 
 }
 
 /// Does a unit; the last one ends as `run` does.
-pub fn unit(args: &UnitArgs, printer: &Printer) -> Result<Outcome> {
-    let done = stonewise::do_unit(&args.out, &args.unit, printer)?;
+pub fn unit(args: &RunArgs, printer: &Printer) -> Result<Outcome> {
+    let [unit] = args.inputs.as_slice() else {
+        bail!("--unit needs the name of one unit");
+    };
+    let unit = unit.to_string_lossy();
+    let done = stonewise::do_unit(&args.out, &unit, printer)?;
     printer.finish();
     if done.was_done {
-        printer.log(&format!("{} was done", args.unit));
+        printer.log(&format!("{unit} was done"));
     }
     Ok(match &done.summary {
         Some(summary) => {

@@ -9,25 +9,19 @@ use std::process::{Command, Stdio};
 fn listed() -> BTreeSet<String> {
     let help = stonewise().arg("--help").output().unwrap();
     let help = String::from_utf8(help.stdout).unwrap();
-    let commands = help
-        .split("Commands:")
-        .nth(1)
-        .unwrap()
-        .split("Options:")
-        .next()
-        .unwrap();
-    let names = commands
-        .lines()
-        .filter(|l| l.starts_with("  ") && !l.starts_with("   "));
-    let names = names.filter_map(|l| l.split_whitespace().next());
-    names.filter(|n| *n != "help").map(str::to_owned).collect()
+    let commands = help.split("Options:").next().unwrap();
+    let names = commands.lines().filter(|l| l.starts_with("  "));
+    names
+        .filter_map(|l| l.split_whitespace().next())
+        .map(str::to_owned)
+        .collect()
 }
 
 #[test]
 fn a_reader_that_closes_the_output_early_is_no_error() {
     let mut command = Command::new(program());
     command
-        .arg("schema")
+        .args(["self", "schema"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
@@ -39,14 +33,17 @@ fn a_reader_that_closes_the_output_early_is_no_error() {
 #[test]
 fn completions_are_scripts_that_bash_accepts_and_that_name_every_command() {
     let folder = tempfile::tempdir().unwrap();
-    let output = stonewise().args(["completions", "bash"]).output().unwrap();
+    let output = stonewise()
+        .args(["self", "completions", "bash"])
+        .output()
+        .unwrap();
     assert!(output.status.success());
     let script = folder.path().join("stonewise.bash");
     fs::write(&script, &output.stdout).unwrap();
     let script = script.to_str().unwrap();
-    // A word begun as `stonewise reg` is completed by bash itself.
+    // A word begun as `stonewise des` is completed by bash itself.
     let ask = format!(
-        "source {script} && COMP_WORDS=(stonewise reg) COMP_CWORD=1 && _stonewise stonewise reg stonewise && echo ${{COMPREPLY[@]}}"
+        "source {script} && COMP_WORDS=(stonewise des) COMP_CWORD=1 && _stonewise stonewise des stonewise && echo ${{COMPREPLY[@]}}"
     );
     let Ok(answer) = Command::new("bash").args(["-c", &ask]).output() else {
         eprintln!("skipped: no bash");
@@ -54,7 +51,7 @@ fn completions_are_scripts_that_bash_accepts_and_that_name_every_command() {
     };
     assert_eq!(
         String::from_utf8_lossy(&answer.stdout).trim(),
-        "register",
+        "design",
         "{answer:?}"
     );
     let text = String::from_utf8(output.stdout).unwrap();
@@ -68,7 +65,7 @@ fn every_command_has_a_man_page_and_none_is_overwritten() {
     let folder = tempfile::tempdir().unwrap();
     let man = || {
         let mut command = stonewise();
-        command.args(["man", "--out"]).arg(folder.path());
+        command.args(["self", "man", "--out"]).arg(folder.path());
         command
     };
     assert!(man().output().unwrap().status.success());
@@ -110,7 +107,10 @@ fn the_version_is_one_line_and_its_details_name_the_weights() {
 fn doctor_says_what_an_empty_environment_lacks() {
     let nothing = tempfile::tempdir().unwrap();
     let mut command = stonewise();
-    command.arg("doctor").env_clear().env("PATH", nothing.path());
+    command
+        .args(["self", "doctor"])
+        .env_clear()
+        .env("PATH", nothing.path());
     let found = command.output().unwrap();
     assert!(found.status.success());
     let text = String::from_utf8(found.stdout).unwrap();

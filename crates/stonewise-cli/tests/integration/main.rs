@@ -24,6 +24,7 @@ mod split;
 mod studio;
 mod support;
 mod survey;
+mod transcripts;
 mod units;
 mod verdict;
 mod verify;

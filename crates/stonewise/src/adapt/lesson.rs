@@ -168,7 +168,7 @@ pub fn lesson(run: &Run) -> Result<Lesson> {
     if keys.is_empty() {
         return Err(refused(
             project,
-            "every epoch has `masks`: train a detector on them with `stonewise train`",
+            "every epoch has `masks`: train a detector on them with `stonewise detector train`",
         ));
     }
 
@@ -177,7 +177,7 @@ pub fn lesson(run: &Run) -> Result<Lesson> {
             project,
             &format!(
                 "{} stones are confirmed by two photos and the cloud, and {LEAST_STONES} are needed: outline some by hand and use \
-                 `stonewise train`",
+                 `stonewise detector train`",
                 confirmed.len()
             ),
         ));

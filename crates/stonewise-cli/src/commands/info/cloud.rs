@@ -55,7 +55,7 @@ fn said_of(images: &E57ImageCounts, path: &Path) -> String {
         };
         let _ = writeln!(
             text,
-            "  contains {kinds}; to unpack them: stonewise photos {path} --out DIR"
+            "  contains {kinds}; to unpack them: stonewise info --unpack-photos {path}"
         );
     }
     for (reason, count) in &images.left_out {

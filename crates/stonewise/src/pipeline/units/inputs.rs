@@ -55,7 +55,7 @@ pub(super) fn unchanged(inputs: &[PlannedInput], plan: &Path) -> Result<BTreeMap
             return Err(Error::Plan {
                 path: plan.to_path_buf(),
                 message: format!(
-                    "{} was changed or moved since the plan was made: run `stonewise plan` again",
+                    "{} was changed or moved since the plan was made: run `stonewise run --plan` again",
                     input.path.display()
                 ),
             });

@@ -145,13 +145,14 @@ impl Plan {
             message: message.to_owned(),
         };
         let text = fs::read(&path)
-            .map_err(|_| none("no plan here: run `stonewise plan PROJECT --out DIR` first"))?;
+            .map_err(|_| none("no plan here: run `stonewise run PROJECT --plan --out DIR` first"))?;
         let plan: Value = serde_json::from_slice(&text).unwrap_or_default();
         if let Some(version) = plan["version"].as_u64().filter(|version| *version != VERSION) {
             return Err(none(&format!(
-                "the plan is of version {version}, this program does plans of version {VERSION}: run `stonewise plan` again"
+                "the plan is of version {version}, this program does plans of version {VERSION}: run `stonewise run --plan` again"
             )));
         }
-        serde_json::from_value(plan).map_err(|_| none("the plan cannot be read: run `stonewise plan` again"))
+        serde_json::from_value(plan)
+            .map_err(|_| none("the plan cannot be read: run `stonewise run --plan` again"))
     }
 }

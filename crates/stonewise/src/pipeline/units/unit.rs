@@ -54,7 +54,7 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
 
     if plan.program != code_version() {
         return Err(stale(
-            "the plan was made by another build of stonewise: do its units with the same, or run `stonewise plan` again",
+            "the plan was made by another build of stonewise: do its units with the same, or run `stonewise run --plan` again",
         ));
     }
 
@@ -128,7 +128,9 @@ fn do_step(context: &Context, unit: &Unit) -> Result<()> {
     let Some(Task { step, epoch }) = tasks.find(|task| task.id() == name) else {
         return Err(Error::Plan {
             path: plan_file(&context.out),
-            message: format!("this build of stonewise has no step {name:?}: run `stonewise plan` again"),
+            message: format!(
+                "this build of stonewise has no step {name:?}: run `stonewise run --plan` again"
+            ),
         });
     };
     match (&step.photos, unit.photo) {
