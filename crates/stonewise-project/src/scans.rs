@@ -67,14 +67,34 @@ impl ScansProject {
 }
 
 fn text_of(scans: &[PathBuf]) -> String {
+    let names = names(scans);
     let mut text = String::from(
-        "# Written by `stonewise run`; your changes are kept. All keys: `stonewise schema`.\n[project]\nname = \"scans\"\n",
+        "# Written by `stonewise run`; your changes are kept. All keys: `stonewise self schema`.\n[project]\n",
     );
-    for (name, scan) in names(scans).iter().zip(scans) {
+    let _ = writeln!(text, "name = {}", quoted(&title(&names)));
+    for (name, scan) in names.iter().zip(scans) {
         let scan = quoted(&scan.to_string_lossy());
         let _ = writeln!(text, "\n[[epochs]]\nname = {}\nclouds = [{scan}]", quoted(name));
     }
     text
+}
+
+/// A title of the project by the names of its epochs: what they begin with in common, up to a separator, and how the
+/// first and the last differ (`dam 2024 to 2025`).
+fn title(names: &[String]) -> String {
+    let [first, .., last] = names else {
+        return names.concat();
+    };
+    let is_common = |end: &usize| names.iter().all(|name| name.starts_with(&first[..*end]));
+    let separators = first.char_indices().filter(|(_, c)| "_- .".contains(*c));
+    let common = separators
+        .map(|(at, c)| at + c.len_utf8())
+        .filter(is_common)
+        .last();
+    let (shared, first_end) = first.split_at(common.unwrap_or(0));
+    let last_end = last.strip_prefix(shared).unwrap_or(last);
+    let shared = shared.replace(['_', '-', '.'], " ");
+    format!("{shared}{first_end} to {last_end}")
 }
 
 /// Names of epochs: those of the files, or of their folders, if these tell them apart, else numbers.
@@ -143,6 +163,21 @@ mod tests {
         let again = ScansProject::new(&all[..2], dir.path()).unwrap();
         assert_eq!(again.project.settings.thresholds.wall.length.alarm_mm, Some(7.5));
         assert!(ScansProject::new(&all, dir.path()).is_err());
+    }
+
+    #[test]
+    fn the_title_says_which_scans_were_compared() {
+        let title = |names: &[&str]| title(&names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>());
+        assert_eq!(title(&["dam_2024", "dam_2025"]), "dam 2024 to 2025");
+        assert_eq!(
+            title(&["wall-a_2019", "wall-a_2021", "wall-a_2024"]),
+            "wall a 2019 to 2024"
+        );
+        assert_eq!(title(&["epoch1", "epoch2"]), "epoch1 to epoch2");
+        assert_eq!(
+            title(&["Mauer_\u{fc}_1", "Mauer_\u{f6}_2"]),
+            "Mauer \u{fc}_1 to \u{f6}_2"
+        );
     }
 
     #[test]
