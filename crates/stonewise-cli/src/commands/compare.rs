@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use std::path::Path;
 use stonewise::check::require_memory_of_clouds;
 use stonewise::results::names::DATA_DIR;
-use stonewise::{Comparison, OutputFolder, Owner, Project, compare_clouds};
+use stonewise::{Comparison, Error, OutputFolder, Owner, Project, compare_clouds};
 use stonewise_core::change::{M3c2Params, params_from_cloudcompare};
 
 /// Compares the clouds of a project, two clouds, or a cloud and a mesh.
@@ -44,7 +44,8 @@ fn c2c(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome> {
 /// C2M of a mesh and a cloud.
 fn c2m(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let [mesh, cloud] = args.inputs.as_slice() else {
-        bail!("c2m needs a mesh and a cloud: stonewise compare c2m mesh.ply cloud.laz");
+        let message = "c2m needs a mesh and a cloud: stonewise compare c2m mesh.ply cloud.laz";
+        return Err(Error::Parameters(message.to_owned()).into());
     };
     let project = Project::of_clouds(mesh, cloud, M3c2Params::default());
     let what = Comparison::C2m {

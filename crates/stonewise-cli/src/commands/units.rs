@@ -6,14 +6,15 @@ use crate::commands::run::{conclude, outcome_of, tell, tell_of_project};
 use crate::counted::counted;
 use crate::printer::Printer;
 use crate::stdout::stdout;
-use anyhow::{Result, bail};
+use anyhow::Result;
 use serde_json::Map;
 use std::io::Write;
+use stonewise::Error;
 
 /// Plans the units of a project and prints them.
 pub fn plan(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let [project] = args.inputs.as_slice() else {
-        bail!("--plan needs one project file");
+        return Err(Error::Parameters("--plan needs one project file".to_owned()).into());
     };
     let coordinator = stonewise::plan(project, &Map::new(), &args.out, force, printer)?;
     printer.finish();
@@ -40,7 +41,7 @@ pub fn plan(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome> {
 /// Does a unit; the last one ends as `run` does.
 pub fn unit(args: &RunArgs, printer: &Printer) -> Result<Outcome> {
     let [unit] = args.inputs.as_slice() else {
-        bail!("--unit needs the name of one unit");
+        return Err(Error::Parameters("--unit needs the name of one unit".to_owned()).into());
     };
     let unit = unit.to_string_lossy();
     let done = stonewise::do_unit(&args.out, &unit, printer)?;

@@ -9,7 +9,9 @@ fn a_certificate_has_all_parts_and_goes_on_where_it_stopped() {
     let dir = tempfile::tempdir().unwrap();
     let certify = || {
         let mut command = stonewise();
-        command.args(["certify", "--quiet", "--walls", "1", "--seed", "3", "--out"]);
+        command.args([
+            "test", "certify", "--quiet", "--walls", "1", "--seed", "3", "--out",
+        ]);
         let output = command
             .arg(dir.path().join("certificate"))
             .arg(survey().join("stonewise.toml"))

@@ -297,7 +297,9 @@ fn photos_of_cameras_that_epochs_share_are_not_missing() {
     let survey = copy_of(tiny_survey());
     let halves = survey.path().join("halves");
     let mut split = stonewise();
-    split.arg("split").arg(survey.path().join("stonewise.toml"));
+    split
+        .args(["test", "split"])
+        .arg(survey.path().join("stonewise.toml"));
     let (code, log) = outcome(split.arg("--seed").arg("1").arg("--out").arg(&halves));
     assert_eq!(code, 0, "{log}");
     let (code, table, log) = check(&halves);

@@ -210,7 +210,12 @@ fn photos_in_e57_files_become_images_and_cameras_of_a_project() {
     let out = folder.path().join("photos");
     let photos = |scan: &Path| {
         let mut command = stonewise();
-        let output = command.arg("photos").arg(scan).arg("--out").arg(&out).output();
+        let output = command
+            .args(["info", "--unpack-photos"])
+            .arg(scan)
+            .arg("--out")
+            .arg(&out)
+            .output();
         let output = output.unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         (output.status.code(), text(output.stdout), text(output.stderr))
@@ -228,7 +233,7 @@ fn photos_in_e57_files_become_images_and_cameras_of_a_project() {
     e57_with_photos(&scan, 0);
     let (code, said, _) = info(std::slice::from_ref(&scan));
     let expected = format!(
-        "  contains 1 photo; to unpack them: stonewise photos {} --out DIR\n",
+        "  contains 1 photo; to unpack them: stonewise info --unpack-photos {}\n",
         scan.display()
     );
     assert!(code == 0 && said.contains(&expected), "{said}");
@@ -389,7 +394,7 @@ fn segment_refuses_options_that_a_project_would_ignore() {
     ] {
         let out = folder.path().join("out");
         let output = stonewise()
-            .arg("segment")
+            .args(["detector", "segment"])
             .arg(&project)
             .args([option, value, "--out"])
             .arg(&out)

@@ -13,7 +13,7 @@ const NOT_COMPARED: [&str; 3] = ["run.json", "data/digests.b3", "work"];
 /// the report.
 fn results(out: &Path) -> Vec<(std::path::PathBuf, Vec<u8>)> {
     let mut all = contents(out, &NOT_COMPARED);
-    all.retain(|(name, _)| !name.starts_with("report"));
+    all.retain(|(name, _)| name != Path::new("report.html"));
     all
 }
 
@@ -52,7 +52,9 @@ fn an_experiment_writes_nothing_before_its_projects_are_read_and_never_over_thei
     let survey = copy_of(tiny_survey());
     let experiment = |project: &Path, out: &Path| {
         let mut command = stonewise();
-        command.args(["experiment", "paper", "--force", "--out"]).arg(out);
+        command
+            .args(["test", "experiment", "paper", "--force", "--out"])
+            .arg(out);
         outcome(command.arg(project))
     };
     let (project, out) = (survey.path().join("stonewise.toml"), survey.path().join("paper"));
@@ -111,7 +113,7 @@ fn a_survey_of_another_seed_is_not_replaced() {
     let simulate = |seed: &str, extra: &[&str]| {
         let mut command = stonewise();
         command
-            .args(["simulate", "--quiet", "--seed", seed, "--params"])
+            .args(["test", "simulate", "--quiet", "--seed", seed, "--params"])
             .arg(&params)
             .arg("--out")
             .arg(&survey);
@@ -142,7 +144,7 @@ fn wrong_parameters_of_a_simulation_are_named_in_a_line_and_leave_nothing() {
     ] {
         fs::write(&params, text).unwrap();
         let mut command = stonewise();
-        command.args(["simulate", "--params"]).arg(&params);
+        command.args(["test", "simulate", "--params"]).arg(&params);
         let (code, log) = outcome(command.arg("--out").arg(&survey));
         assert!(
             code == 2 && log.contains(message) && log.contains("params.toml") && log.ends_with("]\n"),
@@ -153,7 +155,7 @@ fn wrong_parameters_of_a_simulation_are_named_in_a_line_and_leave_nothing() {
     }
     let mut command = stonewise();
     let missing = dir.path().join("missing.toml");
-    command.args(["simulate", "--params"]).arg(&missing);
+    command.args(["test", "simulate", "--params"]).arg(&missing);
     let (code, log) = outcome(command.arg("--out").arg(&survey));
     let expected = format!(
         "error: reading failed: no such file or folder: {} [file-access]\n",
@@ -355,7 +357,9 @@ fn a_training_with_an_impossible_value_makes_no_folder() {
     let (config, out) = (dir.path().join("training.toml"), dir.path().join("trained"));
     fs::write(&config, "[training]\nbatch = 0\n").unwrap();
     let mut command = stonewise();
-    command.args(["train", "--rendered", "--config"]).arg(&config);
+    command
+        .args(["detector", "train", "--rendered", "--config"])
+        .arg(&config);
     let (code, log) = outcome(command.arg("--out").arg(&out));
     assert!(code == 2 && log.contains("training.toml"), "{code}: {log}");
     assert!(!out.exists());

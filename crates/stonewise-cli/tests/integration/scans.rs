@@ -113,7 +113,7 @@ fn pixels_of_views_fit_the_stones() {
     let results = out.path().join("results");
     let (code, log) = outcome(
         stonewise()
-            .arg("segment")
+            .args(["detector", "segment"])
             .arg(&project)
             .arg("--out")
             .arg(&results),

@@ -15,7 +15,7 @@ const SAME_M: f64 = 0.02;
 
 fn split(survey: &Path, out: &Path) -> (i32, String) {
     let mut command = stonewise();
-    command.arg("split").arg(survey.join("stonewise.toml"));
+    command.args(["test", "split"]).arg(survey.join("stonewise.toml"));
     outcome(command.args(["--seed", "2", "--out"]).arg(out))
 }
 

@@ -138,7 +138,7 @@ fn check_crops_show_the_motion(out: &Path) {
 fn a_known_motion_is_found_again_and_scored() {
     let halves = tempfile::tempdir().unwrap();
     stonewise()
-        .arg("split")
+        .args(["test", "split"])
         .arg(survey().join("stonewise.toml"))
         .args(["--seed", "5", "--quiet", "--out"])
         .arg(halves.path())
@@ -359,7 +359,7 @@ fn clouds_alone_can_be_compared() {
     let clouds = [1, 2].map(|e| survey().join(format!("epoch{e}/cloud_tls.laz")));
     for command in ["m3c2", "c2c"] {
         stonewise()
-            .arg(command)
+            .args(["compare", command])
             .args(&clouds)
             .arg("--out")
             .arg(out.path())

@@ -46,7 +46,7 @@ fn reference() -> &'static BTreeMap<PathBuf, Vec<u8>> {
 
 fn plan_command(survey: &Path, out: &Path) -> assert_cmd::Command {
     let mut command = stonewise();
-    command.arg("plan").arg(survey.join("stonewise.toml"));
+    command.args(["run", "--plan"]).arg(survey.join("stonewise.toml"));
     command.arg("--out").arg(out);
     command
 }
@@ -75,13 +75,17 @@ fn needs(plan: &Value) -> BTreeMap<String, BTreeSet<String>> {
 }
 
 fn unit(out: &Path, id: &str) -> (i32, String) {
-    outcome(stonewise().args(["unit", id, "--threads", "1", "--out"]).arg(out))
+    outcome(
+        stonewise()
+            .args(["run", "--unit", id, "--threads", "1", "--out"])
+            .arg(out),
+    )
 }
 
 /// Begins a unit and kills it after a while.
 fn kill(out: &Path, id: &str, after: Duration) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_stonewise"))
-        .args(["unit", id, "--out"])
+        .args(["run", "--unit", id, "--out"])
         .arg(out)
         .stderr(Stdio::null())
         .spawn()
@@ -179,7 +183,9 @@ fn the_same_unit_twice_at_once_and_a_run_afterwards_leave_the_bytes_of_a_run() {
     let out = begun(tiled());
     let units = [0, 1].map(|_| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_stonewise"));
-        command.args(["unit", "segment-2.00000", "--out"]).arg(out.path());
+        command
+            .args(["run", "--unit", "segment-2.00000", "--out"])
+            .arg(out.path());
         command.stderr(Stdio::null()).spawn().unwrap()
     });
     for mut unit in units {
@@ -189,7 +195,10 @@ fn the_same_unit_twice_at_once_and_a_run_afterwards_leave_the_bytes_of_a_run() {
     assert!([0, 3].contains(&code), "{log}");
     assert!(results(out.path()) == *reference());
     let (code, log) = unit(out.path(), "segment-2");
-    assert!(code == 2 && log.contains("stonewise plan"), "{log}");
+    assert!(
+        code == 2 && log.contains("stonewise run") && log.contains("--plan"),
+        "{log}"
+    );
 }
 
 #[test]
@@ -219,7 +228,7 @@ fn a_plan_holds_for_its_inputs_only_and_keeps_what_is_done() {
     fs::write(&file, text.replacen("\"version\": 2", "\"version\": 1", 1)).unwrap();
     let (code, log) = unit(out.path(), "ingest-2");
     assert!(
-        code == 2 && log.contains("of version 1") && log.contains("run `stonewise plan` again"),
+        code == 2 && log.contains("of version 1") && log.contains("run `stonewise run --plan` again"),
         "{log}"
     );
     let (code, log) = outcome(plan_command(survey.path(), out.path()).args(["--batch-points", "20000"]));
@@ -275,7 +284,7 @@ fn photos_in_which_stones_are_tracked_are_inputs_of_the_plan_beside_masks() {
     let (code, log) = unit(out.path(), "ingest-1");
     let name = photo.file_name().unwrap().to_string_lossy();
     assert!(
-        code == 2 && log.contains(&*name) && log.contains("stonewise plan"),
+        code == 2 && log.contains(&*name) && log.contains("stonewise run") && log.contains("--plan"),
         "{log}"
     );
 

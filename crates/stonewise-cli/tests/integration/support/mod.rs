@@ -140,7 +140,7 @@ pub fn simulated(params: &str) -> (TempDir, PathBuf) {
     fs::write(&file, params).unwrap();
     let survey = dir.path().join("survey");
     stonewise()
-        .args(["simulate", "--quiet", "--params"])
+        .args(["test", "simulate", "--quiet", "--params"])
         .arg(&file)
         .arg("--out")
         .arg(&survey)
