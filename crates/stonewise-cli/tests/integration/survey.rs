@@ -202,7 +202,7 @@ fn bad_inputs_are_named_and_nothing_half_written_stays() {
         (
             "a truncated cloud",
             |dir| {
-                let path = dir.join("data/epoch2/cloud_tls.laz");
+                let path = dir.join("epoch2/cloud_tls.laz");
                 let bytes = fs::read(&path).unwrap();
                 fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
             },
