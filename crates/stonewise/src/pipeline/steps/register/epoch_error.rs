@@ -62,7 +62,7 @@ pub(super) fn add_epoch_error(
         }),
         is_aligned: project.is_aligned(epochs.later),
         network: network.as_ref(),
-        scale: known_scale(project, epochs, labelled, network.as_ref(), registered.noise_m())?,
+        scale: known_scale(project, epochs, labelled, network.as_ref())?,
     };
 
     let observers = EpochErrorParams {

@@ -14,11 +14,12 @@ use stonewise_core::registration::observers::{KnownScale, PhotoNetwork};
 const SCANNER_SCALE: f64 = 2e-5;
 /// That of photos without a known length: what control points and positions of cameras usually leave.
 const PHOTO_SCALE: f64 = 1e-3;
+/// Least standard deviation of a length, metres: no tape and no cloud is better.
+const LEAST_SD_M: f64 = 1e-5;
 /// Farthest that an end of a known length lies from the cloud, metres.
 const REACH_M: f64 = 0.05;
 
-/// The scale as instruments and known lengths leave it; `None` where the epochs share it. `noise_m`: of single points, which
-/// the ends of a length have.
+/// The scale as instruments or known lengths leave it; `None` where the epochs share it.
 ///
 /// # Errors
 /// An end of a length lies off its cloud; a tile or a cloud cannot be read.
@@ -27,36 +28,40 @@ pub(super) fn known_scale(
     epochs: Pair<EpochId>,
     labelled: Pair<&Labelled>,
     network: Option<&PhotoNetwork>,
-    noise_m: f64,
 ) -> Result<Option<KnownScale>> {
     let is_one_bundle = network.is_some_and(|n| n.is_joint && n.photos.iter().all(|p| !p.is_empty()));
     if is_one_survey(project, epochs) || is_one_bundle {
         return Ok(None);
     }
-    let mut known = KnownScale {
-        mean: 0.0,
-        sd: 0.0,
-        is_measured: false,
-    };
-    for ((id, labelled), sign) in epochs.zip(labelled).into_iter().zip([-1.0, 1.0]) {
-        let sd = match project.epochs[id].found_origin()? {
-            Some(Origin::Photos) => PHOTO_SCALE,
-            Some(Origin::Scanner) | None => SCANNER_SCALE,
-        };
-        let (mut information, mut sum) = (sd.powi(-2), 0.0);
-        for distance in project.distances.iter().filter(|d| d.epoch == id) {
-            check_ends(distance, labelled)?;
-            let [from, to] = distance.ends;
-            let scale = (to - from).norm() / distance.length_m - 1.0;
-            let variance = (distance.sd_m.powi(2) + 2.0 * noise_m.powi(2)) / distance.length_m.powi(2);
-            let weight = variance.max(f64::MIN_POSITIVE).recip();
-            (information, sum) = (information + weight, sum + weight * scale);
-            known.is_measured = true;
+    let mut of_epochs = [None; 2];
+    let mut instruments = [SCANNER_SCALE; 2];
+    for (k, (id, labelled)) in epochs.zip(labelled).into_iter().enumerate() {
+        let distances = || project.distances.iter().filter(|d| d.epoch == id);
+        distances().try_for_each(|distance| check_ends(distance, labelled))?;
+        of_epochs[k] = measured(distances());
+        if project.epochs[id].found_origin()? == Some(Origin::Photos) {
+            instruments[k] = PHOTO_SCALE;
         }
-        known.mean += sign * sum / information;
-        known.sd = known.sd.hypot(information.sqrt().recip());
     }
-    Ok(Some(known))
+    let [first, later] = [0, 1].map(|k| of_epochs[k].unwrap_or([0.0, instruments[k]]));
+    Ok(Some(KnownScale {
+        mean: later[0] - first[0],
+        sd: later[1].hypot(first[1]),
+        is_measured: of_epochs.iter().any(Option::is_some),
+    }))
+}
+
+/// The scale that known lengths show, and its standard deviation; `None` without any. What the instrument promises does
+/// not count beside them.
+fn measured<'a>(distances: impl Iterator<Item = &'a Distance>) -> Option<[f64; 2]> {
+    let (mut information, mut sum) = (0.0, 0.0);
+    for distance in distances {
+        let [from, to] = distance.ends;
+        let scale = (to - from).norm() / distance.length_m - 1.0;
+        let weight = (distance.length_m / distance.sd_m.max(LEAST_SD_M)).powi(2);
+        (information, sum) = (information + weight, sum + weight * scale);
+    }
+    (information > 0.0).then(|| [sum / information, information.sqrt().recip()])
 }
 
 /// Refuses ends that lie off the cloud of their epoch.
@@ -82,4 +87,31 @@ fn check_ends(distance: &Distance, labelled: &Labelled) -> Result<()> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+
+    fn distance(found_m: f64, length_m: f64, sd_m: f64) -> Distance {
+        Distance {
+            epoch: EpochId::REFERENCE,
+            ends: [Point3::new(1.0, 2.0, 3.0), Point3::new(1.0, 2.0 + found_m, 3.0)],
+            length_m,
+            sd_m,
+            stated: (PathBuf::new(), 1),
+        }
+    }
+
+    #[test]
+    fn lengths_count_by_their_accuracy() {
+        assert_eq!(measured([].iter()), None);
+        let one = measured([distance(10.01, 10.0, 0.002)].iter()).unwrap();
+        assert!((one[0] - 1e-3).abs() < 1e-12 && (one[1] - 2e-4).abs() < 1e-12, "{one:?}");
+        // 1.0e-3 +- 2e-4 and 0.5e-3 +- 1e-4: weights of one to four.
+        let two = measured([distance(10.01, 10.0, 0.002), distance(20.01, 20.0, 0.002)].iter()).unwrap();
+        assert!((two[0] - 0.6e-3).abs() < 1e-12, "{two:?}");
+        assert!((two[1] - 2e-4 / 5f64.sqrt()).abs() < 1e-12, "{two:?}");
+    }
 }
