@@ -25,8 +25,8 @@ pub enum Error {
     },
     /// There is no project file.
     #[error(
-        "no project file is there: name one, or the folder that holds stonewise.toml; `stonewise init DIR` writes one: {path}",
-        path = .path.display()
+        "{path}: no project file is there: name one, or the folder that holds stonewise.toml; `stonewise init {}` writes one",
+        survey(.path).display(), path = .path.display()
     )]
     NoProject {
         /// Where it was looked for.
@@ -36,7 +36,7 @@ pub enum Error {
     #[error("{0}")]
     Parameters(String),
     /// A file could not be read or written.
-    #[error("{}: {path}", failed(.action, .cause), path = .path.display())]
+    #[error("{path}: {}", failed(.action, .cause), path = .path.display())]
     Io {
         /// What was tried.
         action: &'static str,
@@ -46,7 +46,7 @@ pub enum Error {
         cause: std::io::Error,
     },
     /// An input cannot be used.
-    #[error("{message}: {path}", path = .path.display())]
+    #[error("{path}: {message}", path = .path.display())]
     Input {
         /// The file or folder.
         path: PathBuf,
@@ -54,7 +54,7 @@ pub enum Error {
         message: String,
     },
     /// An output folder that must not be written into.
-    #[error("{message}: {path}", path = .path.display())]
+    #[error("{path}: {message}", path = .path.display())]
     Output {
         /// The folder, or the file in it.
         path: PathBuf,
@@ -62,7 +62,7 @@ pub enum Error {
         message: String,
     },
     /// Another process writes into the output folder.
-    #[error("another run works in this folder; wait until it ends, or give another --out: {path}", path = .path.display())]
+    #[error("{path}: another run works in this folder; wait until it ends, or give another --out", path = .path.display())]
     Busy {
         /// The folder.
         path: PathBuf,
@@ -76,7 +76,7 @@ pub enum Error {
         first: Vec<String>,
     },
     /// There is no such unit, or no plan that holds for the inputs and the program of now.
-    #[error("{message}: {path}", path = .path.display())]
+    #[error("{path}: {message}", path = .path.display())]
     Plan {
         /// The plan or the input.
         path: PathBuf,
@@ -153,7 +153,7 @@ pub enum Error {
     #[error(transparent)]
     Layers(#[from] stonewise_io::layers::LayerError),
     /// A result file does not hold what it should.
-    #[error("{message}; create it again with `stonewise run`: {path}", path = .path.display())]
+    #[error("{path}: {message}; create it again with `stonewise run`", path = .path.display())]
     Results {
         /// The file.
         path: PathBuf,
@@ -164,11 +164,11 @@ pub enum Error {
     #[error("{0}")]
     Pdf(String),
     /// There is nothing to report on.
-    #[error("no results here (no data/stones.parquet); give the folder that `stonewise run --out` wrote: {path}", path = .0.display())]
+    #[error("{path}: no results here (no data/stones.parquet); give the folder that `stonewise run --out` wrote", path = .0.display())]
     NoResults(PathBuf),
     /// The folder holds results of a version that laid its files out otherwise.
     #[error(
-        "these results are of an earlier version, which laid its files out otherwise: run again (`stonewise run PROJECT --out {path}`): {path}",
+        "{path}: these results are of an earlier version, which laid its files out otherwise: run again (`stonewise run PROJECT --out {path}`)",
         path = .0.display()
     )]
     OlderResults(PathBuf),
@@ -313,6 +313,18 @@ impl Error {
 }
 
 /// What failed, and why; a missing file in plain words instead of the system's.
+/// The folder of a project file, or that would hold one.
+fn survey(path: &Path) -> &Path {
+    let folder = match path.extension() {
+        Some(_) => path.parent().unwrap_or(path),
+        None => path,
+    };
+    match folder.as_os_str().is_empty() {
+        true => Path::new("."),
+        false => folder,
+    }
+}
+
 fn failed(action: &str, cause: &std::io::Error) -> String {
     match cause.kind() {
         ErrorKind::NotFound => format!("{action} failed: no such file or folder"),

@@ -24,7 +24,7 @@ const BIG_TIFF: [[u8; 4]; 2] = [[b'I', b'I', 43, 0], [b'M', b'M', 0, 43]];
 #[non_exhaustive]
 pub enum ImageIoError {
     /// The file cannot be read or is no intact JPEG, PNG or TIFF.
-    #[error("cannot read the image: {source}: {}", path.display())]
+    #[error("{}: cannot read the image: {source}", path.display())]
     Read {
         /// File.
         path: PathBuf,
@@ -32,13 +32,13 @@ pub enum ImageIoError {
         source: ImageError,
     },
     /// A JPEG without its end.
-    #[error("the photo is cut off: copy it again from the camera: {}", path.display())]
+    #[error("{}: the photo is cut off: copy it again from the camera", path.display())]
     Truncated {
         /// File.
         path: PathBuf,
     },
     /// The file cannot be written.
-    #[error("cannot write the image: {source}: {}", path.display())]
+    #[error("{}: cannot write the image: {source}", path.display())]
     Write {
         /// File.
         path: PathBuf,

@@ -58,5 +58,6 @@ pub mod masks;
 pub mod mesh_ply;
 mod photo_name;
 pub mod table;
+pub mod text;
 pub mod wall;
 mod xml;

@@ -1,8 +1,9 @@
 //! Names of photos as different programs write them.
 
+use crate::text::composed;
 use std::path::Path;
 
-/// A photo's name in lower case, cut into folders and file.
+/// A photo's name in lower case and one form of Unicode, cut into folders and file.
 pub(crate) struct PhotoName {
     folders: Vec<String>,
     file: String,
@@ -14,7 +15,7 @@ pub(crate) type Fit = (u8, usize);
 
 impl PhotoName {
     pub(crate) fn new(name: &str) -> Self {
-        let mut folders: Vec<String> = name
+        let mut folders: Vec<String> = composed(name)
             .to_lowercase()
             .split(['/', '\\'])
             .map(str::to_owned)

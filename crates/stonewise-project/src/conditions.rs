@@ -46,7 +46,7 @@ impl ConditionsFile {
             }
             before = row.day;
             let head = table.file.head().iter().enumerate();
-            for (column, name) in head.filter(|(_, name)| *name != "date") {
+            for (column, name) in head.filter(|(column, _)| *column != table.of_date) {
                 if let Some(value) = row.number(column)? {
                     columns.entry(name.clone()).or_default().push((row.day, value));
                 }
@@ -116,6 +116,24 @@ mod tests {
 
     const LEVELS: &str = "date,reservoir_level_m,temperature_c\n2025-04-01,312.0,\n2025-04-05,314.0,8\n\n2025-05-20,300,20\n\
                           2025-05-21,301,\n";
+
+    #[test]
+    fn the_column_of_dates_may_have_any_name() {
+        for text in [
+            "Datum;Pegel_m\n09.04.2024;312,40\n",
+            "DATE,Pegel_m\n2024-04-09,312.4\n",
+            "Pegel_m;fecha\n312,4;9.4.2024\n",
+        ] {
+            let file = read(text).unwrap();
+            assert_eq!(
+                file.at("2024-04-09").values,
+                BTreeMap::from([("Pegel_m".to_owned(), 312.4)]),
+                "{text}"
+            );
+        }
+        let two = read("Beginn;Ende;Pegel_m\n2024-04-09;2024-04-10;312\n").unwrap_err();
+        assert!(two.to_string().contains("one of them `date`"), "{two}");
+    }
 
     #[test]
     fn readings_are_interpolated_between_near_days_and_nowhere_else() {

@@ -9,7 +9,8 @@ use stonewise_results::calendar::day_of_cell;
 pub(crate) struct DatedCsv {
     /// Its cells.
     pub file: CsvFile,
-    of_date: usize,
+    /// The column of dates.
+    pub of_date: usize,
 }
 
 /// A line of it.
@@ -30,7 +31,7 @@ impl DatedCsv {
     pub fn read(path: &Path, what: &'static str) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(Error::io(what, path))?;
         let file = CsvFile::parse(path, bytes).map_err(in_project)?;
-        let Some(of_date) = file.column("date") else {
+        let Some(of_date) = date_column(&file) else {
             let message = "the first line must name the columns, one of them `date`";
             return Err(in_project(file.error(1, message)));
         };
@@ -72,6 +73,19 @@ impl DatedRow<'_> {
     pub fn error(&self, message: impl Into<String>) -> Error {
         in_project(self.cells.error(message))
     }
+}
+
+/// The column `date`, in whatever case; else, for heads in other languages, the one column that begins with a date.
+fn date_column(file: &CsvFile) -> Option<usize> {
+    let named = file
+        .head()
+        .iter()
+        .position(|name| name.eq_ignore_ascii_case("date"));
+    named.or_else(|| {
+        let first = file.rows().next()?.ok()?;
+        let mut dates = (0..file.head().len()).filter(|&i| day_of_cell(first.text(i)).is_some());
+        dates.next().filter(|_| dates.next().is_none())
+    })
 }
 
 /// An error in a file that the project file names.

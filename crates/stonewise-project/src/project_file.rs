@@ -30,6 +30,7 @@ use stonewise_core::transfer::{CarryParams, StoneParams, TransferParams};
 use stonewise_core::views::ViewParams;
 use stonewise_io::cameras::MapFrame;
 use stonewise_io::crs::{Geoid, MapSystem};
+use stonewise_io::text::as_stored;
 use stonewise_segment::Weights;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -599,7 +600,7 @@ impl Source<'_> {
         if raw.get_ref().to_string_lossy().contains(char::is_control) {
             return Err(self.error(raw.span(), format!("a path with control characters: {SLASHES}")));
         }
-        let path = self.path.parent().unwrap_or(Path::new("")).join(raw.get_ref());
+        let path = as_stored(&self.path.parent().unwrap_or(Path::new("")).join(raw.get_ref()));
         if path.exists() {
             return Ok(path);
         }

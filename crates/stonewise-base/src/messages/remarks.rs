@@ -22,6 +22,16 @@ fn german(remark: &Remark) -> Option<String> {
         Remark::SeveralReconstructions(n) => {
             format!("{n} Rekonstruktionen in der Datei; nur die größte wurde gelesen")
         }
+        Remark::LargestModel {
+            read: (read, photos),
+            others,
+        } => {
+            let others: Vec<String> = others.iter().map(|(place, n)| format!("{place} ({n})")).collect();
+            format!(
+                "das Modell {read} wurde gelesen, mit {photos} Fotos das größte, und nicht {}: Modelle haben kein gemeinsames System",
+                others.join(", ")
+            )
+        }
         Remark::ChunkDisabled(chunk) => format!("Chunk {chunk} ist abgeschaltet und wurde nicht gelesen"),
         Remark::ChunkNotRead { chunk, used } => format!(
             "Chunk {chunk} wurde nicht gelesen, nur {used}, der erste mit ausgerichteten Kameras"

@@ -158,7 +158,7 @@ fn wrong_parameters_of_a_simulation_are_named_in_a_line_and_leave_nothing() {
     command.args(["test", "simulate", "--params"]).arg(&missing);
     let (code, log) = outcome(command.arg("--out").arg(&survey));
     let expected = format!(
-        "error: reading failed: no such file or folder: {} [file-access]\n",
+        "error: {}: reading failed: no such file or folder [file-access]\n",
         missing.display()
     );
     assert_eq!((code, log), (1, expected));

@@ -1,7 +1,7 @@
 //! What can go wrong with camera files and photo folders.
 
 use crate::image_io::ImageIoError;
-use crate::xml;
+use crate::{text, xml};
 use roxmltree::Document;
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum CameraError {
     /// The file system refused.
-    #[error("cannot read cameras or photos: {source}: {}", path.display())]
+    #[error("{}: cannot read cameras or photos: {source}", path.display())]
     Read {
         /// File or folder.
         path: PathBuf,
@@ -18,7 +18,7 @@ pub enum CameraError {
         source: std::io::Error,
     },
     /// The file system refused to write.
-    #[error("cannot write cameras: {source}: {}", path.display())]
+    #[error("{}: cannot write cameras: {source}", path.display())]
     Write {
         /// File or folder.
         path: PathBuf,
@@ -27,16 +27,16 @@ pub enum CameraError {
     },
     /// Not a camera file.
     #[error(
-        "not a camera file: give a Metashape cameras.xml, a COLMAP folder (cameras and images, .txt or .bin), an OpenSfM \
+        "{}: not a camera file: give a Metashape cameras.xml, a COLMAP folder (cameras and images, .txt or .bin), an OpenSfM \
          reconstruction.json, Pix4D's calibrated_camera_parameters.txt or project.opf, or RealityCapture's camera parameters \
-         (.csv) or a folder of its .xmp files: {}", path.display()
+         (.csv) or a folder of its .xmp files", path.display()
     )]
     UnknownFormat {
         /// File or folder.
         path: PathBuf,
     },
     /// A format that is recognised only to say what to give instead.
-    #[error("{instead}: {}", path.display())]
+    #[error("{}: {instead}", path.display())]
     NotRead {
         /// File.
         path: PathBuf,
@@ -44,7 +44,7 @@ pub enum CameraError {
         instead: &'static str,
     },
     /// A value is missing or impossible.
-    #[error("{problem}, at {place}: {}", path.display())]
+    #[error("{}: {problem}, at {place}", path.display())]
     Malformed {
         /// File.
         path: PathBuf,
@@ -55,8 +55,7 @@ pub enum CameraError {
     },
     /// No photo has a pose.
     #[error(
-        "no aligned camera in the file ({skipped} without a usable pose): align the photos and export the cameras again: {}",
-        path.display()
+        "{}: no aligned camera in the file ({skipped} without a usable pose): align the photos and export the cameras again", path.display()
     )]
     NoPoses {
         /// File or folder.
@@ -66,8 +65,8 @@ pub enum CameraError {
     },
     /// The lens model is not supported.
     #[error(
-        "camera model {model} of photo {photo} is not supported: undistort the photos or calibrate with a frame (Brown) \
-         or fisheye model: {}", path.display()
+        "{}: camera model {model} of photo {photo} is not supported: undistort the photos or calibrate with a frame (Brown) \
+         or fisheye model", path.display()
     )]
     UnsupportedModel {
         /// File.
@@ -79,8 +78,8 @@ pub enum CameraError {
     },
     /// Poses that cannot be transformed to the system of the clouds.
     #[error(
-        "cameras in {crs} cannot be transformed to the system of the clouds: {reason}; or set the chunk's reference to the clouds' system, or to \
-         local coordinates in their frame, and export the cameras again: {}", path.display()
+        "{}: cameras in {crs} cannot be transformed to the system of the clouds: {reason}; or set the chunk's reference to the clouds' system, or to \
+         local coordinates in their frame, and export the cameras again", path.display()
     )]
     UnsupportedCrs {
         /// File.
@@ -91,13 +90,13 @@ pub enum CameraError {
         reason: String,
     },
     /// No photo in the folder.
-    #[error("no photo (jpg, jpeg, png, tif) in the folder: {}", folder.display())]
+    #[error("{}: no photo (jpg, jpeg, png, tif) in the folder", folder.display())]
     NoPhotos {
         /// Folder of photos.
         folder: PathBuf,
     },
     /// No photo inside E57 files.
-    #[error("{problem}: {files}")]
+    #[error("{files}: {problem}")]
     NoImages {
         /// Paths of the files.
         files: String,
@@ -121,7 +120,7 @@ pub enum CameraError {
 
 /// Reads a text file.
 pub(super) fn read_text(path: &Path) -> Result<String, CameraError> {
-    std::fs::read_to_string(path).map_err(|source| CameraError::Read {
+    text::read_text(path).map_err(|source| CameraError::Read {
         path: path.to_owned(),
         source,
     })

@@ -5,7 +5,7 @@
 //! 2004, section 6.2.4), whose focal lengths, centre and skew differ by as little. What remains is the
 //! curvature of the earth, 0.8 mm at 100 m, and a thousandth of the lens's distortion.
 
-use crate::crs::{Coordinates, Ellipsoid, Geoid, MapSystem, Projection};
+use crate::crs::{Coordinates, Ellipsoid, Geoid, MapSystem, Projection, UnitName, Units, in_metres};
 use nalgebra::{Matrix3, Point3, Vector3};
 use std::path::PathBuf;
 use stonewise_core::geometry::{Camera, Rigid3, View, nearest_rotation};
@@ -54,17 +54,30 @@ impl MapFrame {
     /// # Errors
     /// Why they cannot.
     pub(super) fn placing(&self, chunk_crs: &str) -> Result<Placing, String> {
-        let Some(chunk) = MapSystem::parse(chunk_crs)? else {
-            return Ok(Placing::Kept);
+        // Poses on the earth are in metres, whatever the unit of the chunk's map, and so are the clouds once they are read.
+        let units = Units::of(chunk_crs)?;
+        let Some(chunk) = MapSystem::parse(&in_metres(chunk_crs))? else {
+            return match units.are_metres() {
+                true => Ok(Placing::Kept),
+                false => Err(format!(
+                    "it is a local frame in {}, and the file does not say whether its poses are, too: choose local coordinates in metres",
+                    UnitName(units.plane_m)
+                )),
+            };
         };
         let clouds = match &self.crs {
-            Some(text) => {
-                MapSystem::parse(text).map_err(|reason| format!("of the clouds' system, {reason}"))?
-            }
+            Some(text) => MapSystem::parse(&in_metres(text))
+                .map_err(|reason| format!("of the clouds' system, {reason}"))?,
             None => None,
         };
         let target = match (clouds, chunk.coordinates) {
             (Some(clouds), _) => clouds,
+            (None, Coordinates::Projected(_)) if !units.are_metres() => {
+                return Err(format!(
+                    "it is in {}, and the clouds name no system: give theirs as crs under [project]",
+                    UnitName(units.plane_m)
+                ));
+            }
             (None, Coordinates::Projected(_)) => chunk.clone(),
             (None, Coordinates::Geocentric) => return Ok(Placing::Kept),
             (None, Coordinates::Geographic) => {

@@ -14,7 +14,7 @@ use stonewise_core::geometry::View;
 ///
 /// - Metashape: the XML of File > Export > Export Cameras.
 /// - COLMAP: a folder with cameras and images as .bin or .txt (.bin wins, as in COLMAP), or one of these
-///   files, or a folder that holds them under `sparse/0`, `sparse` or `0`.
+///   files, or a folder that holds one or more models under `sparse/0`, `sparse` or `0`, of which the largest is read.
 /// - OpenSfM: reconstruction.json.
 /// - Pix4D: PROJECT_calibrated_camera_parameters.txt, with PROJECT_offset.xyz beside it.
 /// - Pix4D and others: the project.opf of the Open Photogrammetry Format, with the files that it names beside it.

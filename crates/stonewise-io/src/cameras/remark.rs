@@ -17,6 +17,13 @@ pub enum Remark {
     SmallerReconstruction,
     /// The file holds this many reconstructions, of which only the largest was read.
     SeveralReconstructions(usize),
+    /// A folder holds several models, of which one was read; each with its place and its number of photos.
+    LargestModel {
+        /// The one that was read.
+        read: (String, usize),
+        /// The others.
+        others: Vec<(String, usize)>,
+    },
     /// This chunk is disabled and was not read.
     ChunkDisabled(String),
     /// A chunk was not read, because another was.
@@ -42,6 +49,17 @@ impl fmt::Display for Remark {
             Self::SmallerReconstruction => f.write_str("in a separate, smaller reconstruction"),
             Self::SeveralReconstructions(n) => {
                 write!(f, "{n} reconstructions in the file; only the largest was read")
+            }
+            Self::LargestModel {
+                read: (read, photos),
+                others,
+            } => {
+                let others: Vec<String> = others.iter().map(|(place, n)| format!("{place} ({n})")).collect();
+                write!(
+                    f,
+                    "model {read} was read, with {photos} photos the largest, and not {}: models do not share a frame",
+                    others.join(", ")
+                )
             }
             Self::ChunkDisabled(chunk) => write!(f, "chunk {chunk} is disabled and was not read"),
             Self::ChunkNotRead { chunk, used } => {

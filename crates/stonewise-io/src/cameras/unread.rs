@@ -1,8 +1,7 @@
 //! Camera files that are recognised only to say what to give instead.
 
 use crate::folder::extension;
-use std::fs::File;
-use std::io::Read;
+use crate::text::read_head;
 use std::path::Path;
 
 /// A file says within so many bytes what it is.
@@ -14,11 +13,7 @@ pub fn unread_cameras(path: &Path) -> Option<&'static str> {
     if !matches!(extension.as_str(), "json" | "out") {
         return None;
     }
-    let mut head = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(HEAD).read_to_end(&mut head))
-        .ok()?;
-    let head = String::from_utf8_lossy(&head);
+    let head = read_head(path, HEAD).ok()?;
     match extension.as_str() {
         "out" if head.starts_with("# Bundle file") => {
             Some("Bundler files are not read: export the cameras as COLMAP, text or binary")

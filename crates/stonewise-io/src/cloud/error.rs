@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum CloudError {
     /// The operating system refused to read.
-    #[error("cannot read {}: {source}", .path.display())]
+    #[error("{}: cannot read it: {source}", .path.display())]
     Read {
         /// The file.
         path: PathBuf,
@@ -16,7 +16,7 @@ pub enum CloudError {
         source: io::Error,
     },
     /// The operating system refused to write, for example because the disk is full.
-    #[error("cannot write {}: {source}", .path.display())]
+    #[error("{}: cannot write it: {source}", .path.display())]
     Write {
         /// The file.
         path: PathBuf,
@@ -24,7 +24,7 @@ pub enum CloudError {
         source: io::Error,
     },
     /// Neither content nor name identifies the format.
-    #[error("unknown point cloud format: {} (known: las, laz, copc, e57, ptx, ply, and text as xyz, txt, csv, asc, pts)", .0.display())]
+    #[error("{}: unknown point cloud format (known: las, laz, copc, e57, ptx, ply, and text as xyz, txt, csv, asc, pts)", .0.display())]
     UnknownFormat(PathBuf),
     /// A format that is recognised only to say what to give instead.
     #[error("{}: this format is not read: export the cloud as E57, LAZ or PLY", .0.display())]
@@ -56,7 +56,7 @@ pub enum CloudError {
         reason: String,
     },
     /// The values to write do not fit the points or the format.
-    #[error("cannot write {}: {reason}", .path.display())]
+    #[error("{}: cannot write it: {reason}", .path.display())]
     Unwritable {
         /// The file.
         path: PathBuf,

@@ -14,7 +14,7 @@ use super::{CloudError, ReadSummary, Remark};
 ///
 /// Columns are separated by semicolons, else by commas, else by spaces or tabs, as the first point shows; with
 /// semicolons, spaces or tabs a comma may stand for the decimal point. Separators at the end of a line add nothing. Lines
-/// that begin with `#`, `//` or `%` are comments. A header, also one in a comment, names the columns (x, y, z, r or red,
+/// that begin with `#`, `//` or `%` are comments. A header, also one in a comment, names the columns (x, y, z, or easting, northing and height in English or German; r or red,
 /// g or green, b or blue, intensity or i); others may hold anything. Without a header the columns are x, y, z and, where the first points have whole numbers
 /// there that are not all 0 or 1, colours; a seventh column is an intensity, behind the colours as CloudCompare writes it,
 /// or in front of them where only that fits and in PTS files, where it is also the fourth of four. Colours go to 255, to
@@ -134,6 +134,11 @@ impl Parts {
         )
     }
 }
+
+/// Names of columns that say where they point, in small letters.
+const EAST: [&str; 6] = ["east", "easting", "e", "rechtswert", "ostwert", "ost"];
+const NORTH: [&str; 6] = ["north", "northing", "n", "hochwert", "nordwert", "nord"];
+const UP: [&str; 7] = ["z", "h", "height", "elevation", "up", "höhe", "hoehe"];
 
 /// Where the values stand in a line.
 #[derive(Debug)]
@@ -288,14 +293,18 @@ impl Columns {
     /// Columns by the names in a header.
     fn named(line: &str) -> Option<Self> {
         let separator = separator(line);
-        let names: Vec<String> = cells(line, separator).map(str::to_ascii_lowercase).collect();
+        let names: Vec<String> = cells(line, separator).map(str::to_lowercase).collect();
         let place = |known: &[&str]| names.iter().position(|name| known.contains(&bare(name)));
         let color = [
             place(&["r", "red"]),
             place(&["g", "green"]),
             place(&["b", "blue"]),
         ];
-        let [x, y, z] = [place(&["x"])?, place(&["y"])?, place(&["z"])?];
+        let position = |words: [&[&str]; 3]| {
+            let [x, y, z] = words.map(place);
+            Some([x?, y?, z?])
+        };
+        let [x, y, z] = position([&["x"], &["y"], &["z"]]).or_else(|| position([&EAST, &NORTH, &UP]))?;
         Some(Self {
             separator,
             position: [x, y, z],
@@ -305,7 +314,7 @@ impl Columns {
             },
             color_factor: 257.0,
             intensity: place(&["i", "intensity", "reflectance"]),
-            y_before_x: y < x,
+            y_before_x: place(&["y"]) < place(&["x"]),
             named: names.len(),
         })
     }

@@ -14,7 +14,7 @@ const NO_HEIGHT: f32 = -88.8888;
 
 /// Why a grid cannot be used.
 #[derive(Debug, thiserror::Error)]
-#[error("{reason}: {}", path.display())]
+#[error("{}: {reason}", path.display())]
 pub struct GeoidError {
     /// The file.
     pub path: PathBuf,

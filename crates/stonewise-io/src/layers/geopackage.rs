@@ -36,7 +36,7 @@ pub enum LayerError {
         geometries: usize,
     },
     /// SQLite refused.
-    #[error("{source}: {path}", path = .path.display())]
+    #[error("{path}: {source}", path = .path.display())]
     Sqlite {
         /// The file.
         path: PathBuf,
@@ -44,7 +44,7 @@ pub enum LayerError {
         source: rusqlite::Error,
     },
     /// A file does not hold the layer, or the layer not what it should.
-    #[error("{message}: {path}", path = .path.display())]
+    #[error("{path}: {message}", path = .path.display())]
     Content {
         /// The file.
         path: PathBuf,

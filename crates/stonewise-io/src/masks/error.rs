@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum MaskError {
     /// The file system refused.
-    #[error("cannot read masks: {source}: {}", path.display())]
+    #[error("{}: cannot read masks: {source}", path.display())]
     Read {
         /// File or folder.
         path: PathBuf,
@@ -16,7 +16,7 @@ pub enum MaskError {
         source: std::io::Error,
     },
     /// The file system refused to write.
-    #[error("cannot write masks: {source}: {}", path.display())]
+    #[error("{}: cannot write masks: {source}", path.display())]
     Write {
         /// File.
         path: PathBuf,
@@ -24,7 +24,7 @@ pub enum MaskError {
         source: std::io::Error,
     },
     /// Not COCO json.
-    #[error("not a COCO instances file: {problem}: {}", path.display())]
+    #[error("{}: not a COCO instances file: {problem}", path.display())]
     Json {
         /// File.
         path: PathBuf,
@@ -32,7 +32,7 @@ pub enum MaskError {
         problem: String,
     },
     /// Not a file of valid regions.
-    #[error("not a file of valid regions: {problem}: {}", path.display())]
+    #[error("{}: not a file of valid regions: {problem}", path.display())]
     Regions {
         /// File.
         path: PathBuf,
@@ -40,7 +40,7 @@ pub enum MaskError {
         problem: String,
     },
     /// There are no masks.
-    #[error("no masks: {expected}: {}", path.display())]
+    #[error("{}: no masks: {expected}", path.display())]
     Empty {
         /// File or folder.
         path: PathBuf,
@@ -48,7 +48,7 @@ pub enum MaskError {
         expected: &'static str,
     },
     /// Several categories, none of which is that of the stones.
-    #[error("its annotations have the categories {found}: call that of the stones \"stone\"; others are left out then: {}", path.display())]
+    #[error("{}: its annotations have the categories {found}: call that of the stones \"stone\"; others are left out then", path.display())]
     Categories {
         /// File.
         path: PathBuf,
@@ -56,7 +56,7 @@ pub enum MaskError {
         found: String,
     },
     /// An annotation cannot be read.
-    #[error("annotation {annotation}: {problem}: {}", path.display())]
+    #[error("{}: annotation {annotation}: {problem}", path.display())]
     BadAnnotation {
         /// File.
         path: PathBuf,
@@ -67,8 +67,7 @@ pub enum MaskError {
     },
     /// Made for another image size.
     #[error(
-        "masks of photo {photo} are {}x{} px, but its camera is {}x{} px: give masks of the original photo: {}",
-        found.0, found.1, expected.0, expected.1, path.display()
+        "{}: masks of photo {photo} are {}x{} px, but its camera is {}x{} px: give masks of the original photo", path.display(), found.0, found.1, expected.0, expected.1
     )]
     WrongSize {
         /// Mask file.
@@ -81,7 +80,7 @@ pub enum MaskError {
         expected: (u32, u32),
     },
     /// Two entries match one photo.
-    #[error("photo {photo} matches both {first} and {second}: rename one, or give each epoch its own masks: {}", path.display())]
+    #[error("{}: photo {photo} matches both {first} and {second}: rename one, or give each epoch its own masks", path.display())]
     Ambiguous {
         /// File or folder.
         path: PathBuf,
@@ -93,7 +92,7 @@ pub enum MaskError {
         second: String,
     },
     /// A PNG that is not a label image.
-    #[error("a label image must be a greyscale PNG of 8 or 16 bits, but this one is {found}: {}", path.display())]
+    #[error("{}: a label image must be a greyscale PNG of 8 or 16 bits, but this one is {found}", path.display())]
     NotGrey {
         /// File.
         path: PathBuf,
@@ -102,8 +101,7 @@ pub enum MaskError {
     },
     /// More pixels than the file can hold.
     #[error(
-        "the header claims {}x{} pixels, but the file has only {length} bytes: write the label image again: {}",
-        claimed.0, claimed.1, path.display()
+        "{}: the header claims {}x{} pixels, but the file has only {length} bytes: write the label image again", path.display(), claimed.0, claimed.1
     )]
     TooManyPixels {
         /// File.
@@ -114,7 +112,7 @@ pub enum MaskError {
         length: u64,
     },
     /// A label does not fit the format.
-    #[error("label {label} does not fit a 16-bit PNG: write COCO json instead: {}", path.display())]
+    #[error("{}: label {label} does not fit a 16-bit PNG: write COCO json instead", path.display())]
     LabelTooLarge {
         /// File.
         path: PathBuf,

@@ -1,5 +1,6 @@
 //! Tables of text as people and other programs write them.
 
+use crate::text::decode;
 use csv::{ReaderBuilder, StringRecord, Trim};
 use std::path::{Path, PathBuf};
 
@@ -8,7 +9,7 @@ const SEPARATORS: [u8; 3] = [b';', b'\t', b','];
 
 /// What a table cannot hold, and where.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}: {}", self.said(), .path.display())]
+#[error("{}: {}", .path.display(), self.said())]
 pub struct CsvError {
     /// The file.
     pub path: PathBuf,
@@ -66,18 +67,14 @@ impl CsvFile {
     ///
     /// # Errors
     /// The bytes are not in UTF-8, two columns have one name, or a quote is never closed.
-    pub fn parse(path: &Path, bytes: impl Into<Vec<u8>>) -> Result<Self, CsvError> {
+    pub fn parse(path: &Path, bytes: impl AsRef<[u8]>) -> Result<Self, CsvError> {
         let mut file = Self {
             path: path.to_path_buf(),
             text: String::new(),
             separator: b',',
             head: Vec::new(),
         };
-        file.text = String::from_utf8(bytes.into()).map_err(|e| {
-            let before = &e.as_bytes()[..e.utf8_error().valid_up_to()];
-            let line = 1 + before.iter().filter(|b| **b == b'\n').count();
-            file.error(line, "a character that is not in UTF-8: save the file as UTF-8")
-        })?;
+        file.text = decode(bytes.as_ref()).map_err(|e| file.error(e.line, e.problem()))?;
         let first = file.text.lines().find(|line| !line.trim().is_empty());
         file.separator = separator(first.unwrap_or_default());
         let names = file.records().next();
@@ -336,10 +333,7 @@ mod tests {
             ),
         ] {
             let found = wrong(text);
-            assert!(
-                found.starts_with(message) && found.ends_with(": levels.csv"),
-                "{found}"
-            );
+            assert!(found.starts_with(&format!("levels.csv: {message}")), "{found}");
         }
         let latin = CsvFile::parse(Path::new("levels.csv"), *b"a;b\n1;2\nH\xf6he;3\n").unwrap_err();
         assert!(

@@ -42,7 +42,7 @@ pub enum TableError {
     #[error("column {0:?} has empty cells")]
     Empty(String),
     /// Not a Parquet file, damaged, or with content that a table cannot hold.
-    #[error("cannot read {}: {reason}", .path.display())]
+    #[error("{}: cannot read it: {reason}", .path.display())]
     Read {
         /// The file.
         path: PathBuf,
@@ -50,7 +50,7 @@ pub enum TableError {
         reason: String,
     },
     /// The file could not be written.
-    #[error("cannot write {}: {reason}", .path.display())]
+    #[error("{}: cannot write it: {reason}", .path.display())]
     Write {
         /// The file.
         path: PathBuf,

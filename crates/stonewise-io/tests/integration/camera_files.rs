@@ -338,6 +338,113 @@ fn colmap_folders_that_cannot_be_read_say_why() {
     assert!(message(&fixture("rejected")).contains("not a camera file"));
 }
 
+/// A COLMAP model whose cameras stand in a row.
+fn colmap(folder: &Path, photos: &[&str]) {
+    std::fs::create_dir_all(folder).unwrap();
+    std::fs::write(
+        folder.join("cameras.txt"),
+        "1 SIMPLE_PINHOLE 4000 3000 3200 2000 1500\n",
+    )
+    .unwrap();
+    let images: Vec<String> = photos
+        .iter()
+        .enumerate()
+        .map(|(i, name)| format!("{i} 1 0 0 0 -{i} 0 5 1 {name}\n\n"))
+        .collect();
+    std::fs::write(folder.join("images.txt"), images.concat()).unwrap();
+}
+
+#[test]
+fn the_largest_of_several_models_is_read_and_the_others_are_named() {
+    for (small, large) in [("sparse/0", "sparse/1"), ("2", "10"), ("sparse/0", "sparse/geo")] {
+        let folder = tempfile::tempdir().unwrap();
+        colmap(&folder.path().join(small), &["a.jpg", "other.jpg"]);
+        colmap(&folder.path().join(large), &["a.jpg", "b.jpg", "c.jpg"]);
+        let file = read_cameras(folder.path()).unwrap();
+        assert_eq!(file.views.len(), 3);
+        assert_eq!(
+            file.skipped,
+            [("other.jpg".to_owned(), Remark::SmallerReconstruction)]
+        );
+        let said = file.warnings[0].to_string();
+        assert!(
+            said.contains(&format!("model {large} was read, with 3 photos")),
+            "{said}"
+        );
+        assert!(said.contains(&format!("not {small} (2)")), "{said}");
+        // Of equal ones the first; one that is named itself has no rival.
+        colmap(&folder.path().join(small), &["a.jpg", "b.jpg", "d.jpg"]);
+        assert_eq!(read_cameras(folder.path()).unwrap().views[2].name, "d.jpg");
+        let named = read_cameras(&folder.path().join(large)).unwrap();
+        assert!(named.warnings.is_empty() && named.skipped.is_empty());
+    }
+}
+
+#[test]
+fn the_label_of_a_group_is_a_folder_of_the_name() {
+    let text = std::fs::read_to_string(fixture("metashape.xml")).unwrap();
+    let (begin, end) = (text.find("<camera ").unwrap(), text.rfind("</cameras>").unwrap());
+    let grouped = format!(
+        "{}<group id=\"0\" label=\"100MEDIA\" type=\"folder\">{}</group>{}",
+        &text[..begin],
+        &text[begin..end],
+        &text[end..]
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cameras.xml");
+    std::fs::write(&path, grouped).unwrap();
+    let names = |path: &Path| -> Vec<String> {
+        read_cameras(path)
+            .unwrap()
+            .views
+            .into_iter()
+            .map(|v| v.name)
+            .collect()
+    };
+    let plain = names(&fixture("metashape.xml"));
+    let expected: Vec<String> = plain.iter().map(|name| format!("100MEDIA/{name}")).collect();
+    assert_eq!(names(&path), expected);
+}
+
+#[test]
+fn camera_files_may_begin_with_a_mark_and_be_in_utf_16() {
+    let utf_16 = |text: &str| -> Vec<u8> {
+        let text = format!("\u{feff}{text}");
+        text.encode_utf16().flat_map(u16::to_le_bytes).collect()
+    };
+    let marked = |text: &str| format!("\u{feff}{text}").into_bytes();
+    let writers: [&dyn Fn(&str) -> Vec<u8>; 2] = [&utf_16, &marked];
+    for name in [
+        "metashape.xml",
+        "opensfm.json",
+        "pix4d/dam_calibrated_camera_parameters.txt",
+    ] {
+        let source = fixture(name);
+        let text = std::fs::read_to_string(&source).unwrap();
+        let expected = read_cameras(&source).unwrap().views;
+        for write in writers {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join(source.file_name().unwrap());
+            std::fs::write(&path, write(&text)).unwrap();
+            let offset = source.with_file_name("dam_offset.xyz");
+            if name.starts_with("pix4d") {
+                let offset = std::fs::read_to_string(offset).unwrap();
+                std::fs::write(folder.path().join("dam_offset.xyz"), write(&offset)).unwrap();
+            }
+            assert_eq!(read_cameras(&path).unwrap().views, expected, "{name}");
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for file in ["cameras.txt", "images.txt"] {
+        let text = std::fs::read_to_string(fixture("colmap_txt").join(file)).unwrap();
+        std::fs::write(folder.path().join(file), marked(&text)).unwrap();
+    }
+    assert_eq!(
+        read_cameras(folder.path()).unwrap().views,
+        read_cameras(&fixture("colmap_txt")).unwrap().views
+    );
+}
+
 #[test]
 fn every_truncation_of_a_binary_file_is_an_error() {
     let folder = tempfile::tempdir().unwrap();

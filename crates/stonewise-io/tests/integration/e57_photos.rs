@@ -385,24 +385,21 @@ fn files_without_photos_say_so() {
     let out = folder.path().join("out");
     let scans = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/clouds/two_scans.e57");
     let message = unpack(&[scans], &out).unwrap_err();
-    assert!(
-        message.starts_with("no images inside: ") && message.ends_with("two_scans.e57"),
-        "{message}"
-    );
+    assert!(message.contains("two_scans.e57: no images inside"), "{message}");
     let path = e57(
         &folder.path().join("a.e57"),
         &[&|image: &mut Images<'_>| add_pinhole(image, "jpg", None)],
     );
     let message = unpack(&[path], &out).unwrap_err();
     assert!(
-        message.contains("(1 without a pose)") && message.ends_with("a.e57"),
+        message.contains("(1 without a pose)") && message.contains("a.e57: "),
         "{message}"
     );
     assert!(!out.exists());
     let laz = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/clouds/las12_format3.las");
     let message = unpack(&[laz], &out).unwrap_err();
     assert!(
-        message.contains("not an E57 file") && message.ends_with(".las"),
+        message.contains(".las: ") && message.contains("not an E57 file"),
         "{message}"
     );
 }
@@ -427,7 +424,7 @@ fn a_damaged_image_is_named_and_leaves_nothing_half_written() {
     let sound = fs::read(&path).unwrap();
     let refusal = || {
         let message = unpack(std::slice::from_ref(&path), &out).unwrap_err();
-        assert!(message.ends_with("a.e57"), "{message}");
+        assert!(message.contains("a.e57: "), "{message}");
         let left = [names(&out.join("images")), names(&out.join("colmap"))].concat();
         assert!(!left.iter().any(|name| name.ends_with(".partial")), "{left:?}");
         assert!(!out.join("colmap/images.txt").exists());

@@ -142,8 +142,8 @@ fn pictures_that_lie_about_their_sizes_are_refused_at_once() {
         message.contains("are 60000x60000 px, but its camera is 4000x3000 px"),
         "{message}"
     );
-    assert!(refusal(&path, read_rgb).starts_with("cannot read the image: "));
-    assert!(refusal(&testdata("hostile/lie.jpg"), read_rgb).starts_with("cannot read the image: "));
+    assert!(refusal(&path, read_rgb).starts_with("FILE: cannot read the image: "));
+    assert!(refusal(&testdata("hostile/lie.jpg"), read_rgb).starts_with("FILE: cannot read the image: "));
 }
 
 #[test]

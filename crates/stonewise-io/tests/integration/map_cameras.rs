@@ -201,6 +201,38 @@ fn earth_centred_cameras_see_the_clouds_where_they_are() {
 }
 
 #[test]
+fn a_chunk_in_feet_is_refused_where_its_poses_may_be_in_metres() {
+    let folder = tempfile::tempdir().unwrap();
+    let expected = expected();
+    let pose = &expected["cameras"][0]["pose"];
+    let local = r#"LOCAL_CS["Local Coordinates (ft)",LOCAL_DATUM["Local Datum",0],UNIT["foot",0.3048]]"#;
+    let utm = Crs::parse("EPSG:25832")
+        .unwrap()
+        .wkt
+        .replace("[\"metre\",1]", "[\"anything\",0.3048]");
+    for (crs, fix) in [
+        (local, "local coordinates in metres"),
+        (&utm, "give theirs as crs"),
+    ] {
+        let path = metashape(folder.path(), crs, &[pose]);
+        let error = read_cameras_on_map(&path, None, &MapFrame::default())
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("feet (0.3048 m)") && error.contains(fix),
+            "{error}"
+        );
+    }
+    // Metashape's poses on the earth are in metres.
+    let path = metashape(folder.path(), &utm, &[pose]);
+    let map = MapFrame {
+        crs: Some("EPSG:25832".to_owned()),
+        ..MapFrame::default()
+    };
+    assert!(read_cameras_on_map(&path, None, &map).is_ok());
+}
+
+#[test]
 fn a_chunk_in_degrees_comes_to_the_system_of_the_clouds() {
     let folder = tempfile::tempdir().unwrap();
     let expected = expected();
@@ -245,7 +277,13 @@ fn a_chunk_in_degrees_comes_to_the_system_of_the_clouds() {
         .unwrap()
         .wkt
         .replace("[\"metre\",1]", "[\"US survey foot\",0.3048006]");
-    assert!(refused(&map(&feet)).contains("its unit is not the metre"));
+    // Clouds in feet are read as metres; of the place on the map only the false easting has another value.
+    let centre = |map: &MapFrame| read_cameras_on_map(&path, None, map).unwrap().views[0].centre();
+    let shift = centre(&map(&feet)) - centre(&map("EPSG:32632"));
+    assert!(
+        (shift.x + 500_000.0 * (1.0 - 0.304_800_6)).abs() < 1e-6 && shift.yz().norm() < 1e-6,
+        "{shift}"
+    );
     let utm = Crs::parse("EPSG:25832").unwrap().wkt;
     let above_geoid =
         format!("COMPD_CS[\"both\",{utm},VERT_CS[\"DHHN2016 height\",VERT_DATUM[\"DHHN2016\",2005]]]");

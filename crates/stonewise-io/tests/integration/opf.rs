@@ -218,7 +218,7 @@ fn damaged_calibrations_are_refused_with_file_and_place() {
     ] {
         let error = changed(LAST, from, to).unwrap_err();
         assert!(
-            error.contains(expected) && error.ends_with(&format!(": FOLDER/{LAST}")),
+            error.contains(expected) && error.starts_with(&format!("FOLDER/{LAST}: ")),
             "{error}"
         );
     }

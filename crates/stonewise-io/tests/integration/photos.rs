@@ -81,6 +81,16 @@ fn folders_in_the_name_tell_photos_apart() {
     assert_eq!(rest, ["masks/0002.png"]);
 }
 
+/// Apple's file systems take letters and their accents apart.
+#[test]
+fn names_match_in_either_form_of_unicode() {
+    let (paths, rest) = found(&["No\u{308}rd/Ma\u{308}uer_1.jpg"], &["n\u{f6}rd/m\u{e4}uer_1"]);
+    assert_eq!((paths.len(), rest.len()), (1, 0));
+    assert!(paths[0].is_some());
+    let (paths, _) = found(&["M\u{e4}uer_1.jpg"], &["Ma\u{308}uer_1.JPG"]);
+    assert!(paths[0].is_some());
+}
+
 #[test]
 fn two_fitting_photos_are_an_error_that_names_both() {
     let folder = folder(&["flight1/0001.jpg", "flight2/0001.jpg"]);

@@ -10,6 +10,7 @@ use stonewise_base::error::{Error, Result};
 use stonewise_base::files::write_text;
 use stonewise_core::geometry::is_simple;
 use stonewise_core::transfer::LabelEdit;
+use stonewise_io::text::read_text;
 use stonewise_results::Facade;
 use stonewise_results::calendar::day_of;
 
@@ -238,7 +239,7 @@ impl EditsFile {
     /// # Errors
     /// With the line: no JSON, an unknown key, a shape that does not fit, no signature.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(Error::io("reading the edits", path))?;
+        let text = read_text(path).map_err(Error::io("reading the edits", path))?;
         let at = |line: usize, message: String| Error::Project {
             path: path.to_path_buf(),
             line,

@@ -7,6 +7,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_base::error::{Error, Result};
+use stonewise_io::text::read_text;
 
 #[derive(Deserialize)]
 struct RawFile {
@@ -45,7 +46,7 @@ pub(super) fn edits(path: &Path, epoch: Option<&str>, signed: &Signed) -> Result
         path: path.to_path_buf(),
         message,
     };
-    let text = std::fs::read_to_string(path).map_err(Error::io("reading", path))?;
+    let text = read_text(path).map_err(Error::io("reading", path))?;
     let file: RawFile = serde_json::from_str(&text).map_err(|e| {
         wrong(format!(
             "no COCO file with images, annotations and categories ({e})"

@@ -1,16 +1,19 @@
 //! Finds a photo by its name.
 
+use stonewise_io::text::composed;
+
 /// Index of the photo with this name. Whole names are compared first, then names without folders, then names
-/// without folders and extension; the first comparison that any photo passes decides. Case is ignored.
+/// without folders and extension; the first comparison that any photo passes decides. Case is ignored, and so is the form of Unicode.
 /// `photos`: all names of each photo.
 ///
 /// # Errors
 /// No photo or several photos have this name; the message says which.
 pub fn photo_named(wanted: &str, photos: &[Vec<String>]) -> Result<usize, String> {
-    let target = wanted.to_lowercase();
+    let plain = |name: &str| composed(name).to_lowercase();
+    let target = plain(wanted);
     let forms = [whole, file, stem];
     for form in forms {
-        let fits = |names: &Vec<String>| names.iter().any(|n| form(&n.to_lowercase()) == form(&target));
+        let fits = |names: &Vec<String>| names.iter().any(|n| form(&plain(n)) == form(&target));
         let fitting: Vec<usize> = (0..photos.len()).filter(|&i| fits(&photos[i])).collect();
         match fitting[..] {
             [] => {}

@@ -22,7 +22,7 @@ pub enum TrainError {
         rate: f64,
     },
     /// A checkpoint cannot be used.
-    #[error("cannot continue from this checkpoint: {problem}: {}", path.display())]
+    #[error("{}: cannot continue from this checkpoint: {problem}", path.display())]
     Checkpoint {
         /// File.
         path: PathBuf,
@@ -30,7 +30,7 @@ pub enum TrainError {
         problem: String,
     },
     /// A file could not be read or written.
-    #[error("{action} failed: {source}: {}", path.display())]
+    #[error("{}: {action} failed: {source}", path.display())]
     Io {
         /// What was tried.
         action: &'static str,

@@ -23,13 +23,13 @@ pub enum SimulateError {
         needed: &'static str,
     },
     /// The folder holds a project that was not simulated.
-    #[error("the folder already holds a project of its own, choose another: {}", path.display())]
+    #[error("{}: the folder already holds a project of its own, choose another", path.display())]
     Occupied {
         /// The folder.
         path: PathBuf,
     },
     /// A folder or a text file cannot be written.
-    #[error("cannot write: {source}: {}", path.display())]
+    #[error("{}: cannot write: {source}", path.display())]
     Write {
         /// File or folder.
         path: PathBuf,

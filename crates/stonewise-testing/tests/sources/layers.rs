@@ -37,7 +37,7 @@ const CORE: Layers = &[
 ];
 
 const IO: Layers = &[
-    &["xml"],
+    &["text", "xml"],
     &["atomic", "crs", "exif", "folder", "photo_name", "wall"],
     &["image_io"],
     &["cameras", "cloud", "mesh_ply", "table"],

@@ -10,49 +10,90 @@ mod write;
 
 pub use write::write_colmap;
 
-use super::{CameraError, CameraFile};
+use super::{CameraError, CameraFile, Remark};
 use nalgebra::{Quaternion, Translation3};
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::{Camera, Rigid3, View, rotation_of};
 use stonewise_core::id::ImageId;
 
-/// Whether a folder holds a COLMAP model, in itself or in its `sparse/0`, `sparse` or `0`.
+/// Whether a folder holds a COLMAP model, see [`read_folder`].
 pub fn is_camera_folder(folder: &Path) -> bool {
-    model_files(folder).is_some()
+    !models(folder).is_empty()
 }
 
-/// Reads the model in a folder, or in its `sparse/0`, `sparse` or `0`.
+/// Reads the model in a folder itself, else the one with most photos in its `sparse`, in a folder there, or in a numbered
+/// folder such as `0`: COLMAP writes a model for each group of photos that it cannot join to the others.
 pub fn read_folder(folder: &Path) -> Result<CameraFile, CameraError> {
-    match model_files(folder) {
-        Some((cameras, images)) => read_pair(&cameras, &images),
-        None => Err(CameraError::UnknownFormat {
+    let models = models(folder);
+    let mut read = Vec::new();
+    for (place, extension) in &models {
+        read.push(read_model(place, extension)?);
+    }
+    let largest = (0..read.len()).max_by_key(|&i| (read[i].views.len(), std::cmp::Reverse(i)));
+    let Some(largest) = largest else {
+        return Err(CameraError::UnknownFormat {
             path: PathBuf::from(folder),
-        }),
+        });
+    };
+    let mut file = std::mem::take(&mut read[largest]);
+    if models.len() > 1 {
+        let name = |i: usize| {
+            let place = models[i].0.strip_prefix(folder).unwrap_or(&models[i].0);
+            place.to_string_lossy().replace('\\', "/")
+        };
+        let others = (0..read.len()).filter(|&i| i != largest);
+        file.warnings.push(Remark::LargestModel {
+            read: (name(largest), file.views.len()),
+            others: others.clone().map(|i| (name(i), read[i].views.len())).collect(),
+        });
+        let names: BTreeSet<&str> = file.views.iter().map(|view| view.name.as_str()).collect();
+        let elsewhere = others.flat_map(|i| &read[i].views);
+        let left = elsewhere.filter(|view| !names.contains(view.name.as_str()));
+        let left = left.map(|view| (view.name.clone(), Remark::SmallerReconstruction));
+        file.skipped.extend(left);
     }
+    Ok(file)
 }
 
-fn model_files(folder: &Path) -> Option<(PathBuf, PathBuf)> {
-    for inner in ["", "sparse/0", "sparse", "0"] {
-        for extension in ["bin", "txt"] {
-            let base = folder.join(inner);
-            let cameras = base.join("cameras").with_extension(extension);
-            let images = base.join("images").with_extension(extension);
-            if cameras.is_file() && images.is_file() {
-                return Some((cameras, images));
-            }
-        }
+/// Folders of models, with the extension of their files, in the order of their names.
+fn models(folder: &Path) -> Vec<(PathBuf, &'static str)> {
+    let model = |place: PathBuf| {
+        let has = |name: &str, extension: &str| place.join(name).with_extension(extension).is_file();
+        let extension = ["bin", "txt"]
+            .into_iter()
+            .find(|e| has("cameras", e) && has("images", e))?;
+        Some((place, extension))
+    };
+    if let Some(own) = model(folder.to_owned()) {
+        return vec![own];
     }
-    None
+    let is_number = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        !name.is_empty() && name.bytes().all(|b| b.is_ascii_digit())
+    };
+    let sparse = folder.join("sparse");
+    let mut places = inner(&sparse);
+    places.push(sparse);
+    places.extend(inner(folder).into_iter().filter(is_number));
+    places.into_iter().filter_map(model).collect()
 }
 
-fn read_pair(cameras: &Path, images: &Path) -> Result<CameraFile, CameraError> {
-    let is_binary = cameras.extension().is_some_and(|e| e == "bin");
-    let (raw_cameras, raw_images) = if is_binary {
-        (binary::read_cameras(cameras)?, binary::read_images(images)?)
-    } else {
-        (text::read_cameras(cameras)?, text::read_images(images)?)
+/// What lies in a folder, sorted by the length of the names and then by the names, which sorts numbers.
+fn inner(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    paths.sort_by_cached_key(|path| (path.as_os_str().len(), path.clone()));
+    paths
+}
+
+fn read_model(folder: &Path, extension: &str) -> Result<CameraFile, CameraError> {
+    let [cameras, images] = ["cameras", "images"].map(|name| folder.join(name).with_extension(extension));
+    let (cameras, images) = (cameras.as_path(), images.as_path());
+    let (raw_cameras, raw_images) = match extension {
+        "bin" => (binary::read_cameras(cameras)?, binary::read_images(images)?),
+        _ => (text::read_cameras(cameras)?, text::read_images(images)?),
     };
     let mut converted: BTreeMap<u32, Camera> = BTreeMap::new();
     let mut file = CameraFile::default();

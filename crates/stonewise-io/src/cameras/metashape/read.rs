@@ -4,6 +4,7 @@ use super::super::map_frame::{MapFrame, Placing};
 use super::super::{CameraError, CameraFile, Remark, malformed, parse_xml, read_text};
 use super::frame::{Frames, Similarity};
 use super::sensor;
+use crate::crs::in_metres;
 use crate::xml::Element;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -64,13 +65,10 @@ fn read_chunk(chunk: Element<'_>, path: &Path, map: &MapFrame) -> Result<CameraF
     };
     let frames = Frames::read(chunk, path)?;
     let mut sensors: BTreeMap<&str, Camera> = BTreeMap::new();
-    // Those in groups included.
-    let cameras = chunk
-        .child("cameras")
-        .into_iter()
-        .flat_map(|list| list.below("camera"));
-    for element in cameras {
-        let name = element.attribute("label").unwrap_or_default().to_owned();
+    for (group, element) in cameras(chunk) {
+        let label = element.attribute("label").unwrap_or_default();
+        // The group of photos that were added as a folder has the folder's name.
+        let name = group.map_or_else(|| label.to_owned(), |group| format!("{group}/{label}"));
         let posed = match posed(element, &frames) {
             Ok(posed) => posed,
             Err(reason) => {
@@ -102,6 +100,15 @@ fn read_chunk(chunk: Element<'_>, path: &Path, map: &MapFrame) -> Result<CameraF
     Ok(file)
 }
 
+/// The cameras of a chunk, each with the label of its group.
+fn cameras(chunk: Element<'_>) -> impl Iterator<Item = (Option<&str>, Element<'_>)> {
+    let entries = chunk.child("cameras").into_iter().flat_map(Element::children);
+    entries.flat_map(|entry| {
+        let group = entry.attribute("label").filter(|_| entry.name() == "group");
+        entry.below("camera").map(move |camera| (group, camera))
+    })
+}
+
 /// Brings the cameras of a chunk to the clouds: Metashape stores the poses of all but local chunks
 /// earth-centred.
 fn place(file: &mut CameraFile, path: &Path, map: &MapFrame) -> Result<(), CameraError> {
@@ -115,7 +122,8 @@ fn place(file: &mut CameraFile, path: &Path, map: &MapFrame) -> Result<(), Camer
         for view in &mut file.views {
             placing.place(view).map_err(unsupported)?;
         }
-        file.crs = map.crs.clone().or_else(|| file.crs.take());
+        let crs = map.crs.clone().or_else(|| file.crs.take());
+        file.crs = crs.map(|crs| in_metres(&crs));
     }
     Ok(())
 }

@@ -4,10 +4,9 @@ use super::super::photo_sizes::PhotoSizes;
 use super::super::pose::{FLIP, camera_at, rotation};
 use super::super::{CameraError, CameraFile, Remark, malformed, read_text};
 use super::lens::{FILM_MM, Lens, unsupported};
+use crate::text::read_head;
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Vector3};
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 use stonewise_core::geometry::{Rigid3, View};
 use stonewise_core::id::ImageId;
@@ -23,17 +22,15 @@ const TERMS: [&str; 6] = ["k1", "k2", "k3", "k4", "t1", "t2"];
 
 /// Whether a file is of this format, by its first lines.
 pub fn is_csv(path: &Path) -> bool {
-    let mut head = Vec::new();
-    let is_read = File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
-    let head = String::from_utf8_lossy(&head).to_lowercase();
+    let head = read_head(path, HEAD).unwrap_or_default().to_lowercase();
     let columns = head.lines().find_map(header).unwrap_or_default();
     let has = |name: &str| columns.iter().any(|column| column == name);
-    is_read.is_ok() && ((has("roll") && has("alt")) || (has("tx") && has("r00")))
+    (has("roll") && has("alt")) || (has("tx") && has("r00"))
 }
 
 /// The names of the columns, if a line gives them.
 fn header(line: &str) -> Option<Vec<String>> {
-    let line = line.trim_start_matches('\u{feff}').trim().to_lowercase();
+    let line = line.trim().to_lowercase();
     // A remark in brackets may follow the names.
     let columns = line.strip_prefix('#')?.split('(').next()?.split(',');
     let names: Vec<String> = columns.map(|column| column.trim().to_owned()).collect();

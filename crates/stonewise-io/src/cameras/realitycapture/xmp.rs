@@ -5,6 +5,7 @@ use super::super::pose::{camera_at, rotation};
 use super::super::{CameraError, CameraFile, Remark, malformed, parse_xml, read_text};
 use super::lens::{FILM_MM, Lens, unsupported};
 use crate::folder::files_below;
+use crate::text;
 use crate::xml::Element;
 use nalgebra::{Matrix3, Point3};
 use std::path::Path;
@@ -18,8 +19,7 @@ const NAMESPACE: &str = "http://www.capturingreality.com/ns/xcr/";
 pub fn is_sidecar_folder(folder: &Path) -> bool {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let mut paths = entries.map(|entry| entry.path());
-    paths
-        .any(|path| is_xmp(&path) && std::fs::read_to_string(path).is_ok_and(|text| text.contains(NAMESPACE)))
+    paths.any(|path| is_xmp(&path) && text::read_text(&path).is_ok_and(|text| text.contains(NAMESPACE)))
 }
 
 fn is_xmp(path: &Path) -> bool {

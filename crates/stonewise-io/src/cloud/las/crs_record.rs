@@ -10,6 +10,7 @@ const WKT: u16 = 2112;
 /// The directory of GeoTIFF keys, and their numbers.
 const KEYS: u16 = 34735;
 const DOUBLES: u16 = 34736;
+const TEXTS: u16 = 34737;
 /// The key that says what kind the coordinates are of, and its values.
 const KIND: u16 = 1024;
 const PROJECTED: u16 = 1;
@@ -49,7 +50,7 @@ pub fn named_system<'a>(records: impl Iterator<Item = &'a Vlr> + Clone) -> Resul
         }
     }
     let data = |id: u16| of(id).map_or(&[][..], |record| &record.data);
-    Keys::of(data(KEYS), data(DOUBLES)).system()
+    Keys::of(data(KEYS), data(DOUBLES), data(TEXTS)).system()
 }
 
 /// Whether a record holds a system as WKT.
@@ -94,13 +95,14 @@ fn key_record(code: u16) -> Vlr {
 
 /// GeoTIFF keys (OGC 19-008r4), by their numbers.
 struct Keys {
-    /// Key, place (0: the value itself; else the record that holds it), value or index there.
-    entries: Vec<[u16; 3]>,
+    /// Key, place (0: the value itself; else the record that holds it), count, value or index there.
+    entries: Vec<[u16; 4]>,
     doubles: Vec<f64>,
+    texts: String,
 }
 
 impl Keys {
-    fn of(directory: &[u8], doubles: &[u8]) -> Self {
+    fn of(directory: &[u8], doubles: &[u8], texts: &[u8]) -> Self {
         let words: Vec<u16> = directory
             .as_chunks::<2>()
             .0
@@ -109,10 +111,8 @@ impl Keys {
             .collect();
         let (entries, _) = words.get(4..).unwrap_or_default().as_chunks::<4>();
         Self {
-            entries: entries
-                .iter()
-                .map(|[id, place, _, value]| [*id, *place, *value])
-                .collect(),
+            entries: entries.to_vec(),
+            texts: texts.iter().map(|&b| char::from(b)).collect(),
             doubles: doubles
                 .as_chunks::<8>()
                 .0
@@ -127,16 +127,66 @@ impl Keys {
         let found = self
             .entries
             .iter()
-            .find(|[id, place, _]| *id == key && *place == 0);
-        found.map(|[_, _, value]| *value).filter(|value| *value != 0)
+            .find(|[id, place, ..]| *id == key && *place == 0);
+        found.map(|[.., value]| *value).filter(|value| *value != 0)
     }
 
     fn double(&self, key: u16) -> Option<f64> {
         let found = self
             .entries
             .iter()
-            .find(|[id, place, _]| *id == key && *place == DOUBLES);
-        self.doubles.get(usize::from(found?[2])).copied()
+            .find(|[id, place, ..]| *id == key && *place == DOUBLES);
+        self.doubles.get(usize::from(found?[3])).copied()
+    }
+
+    /// A text without the bar at its end, and without quotes.
+    fn text(&self, key: u16) -> Option<String> {
+        let mut entries = self.entries.iter();
+        let [.., count, begin] = entries.find(|[id, place, ..]| *id == key && *place == TEXTS)?;
+        let text = self
+            .texts
+            .chars()
+            .skip(usize::from(*begin))
+            .take(usize::from(*count));
+        let text: String = text.filter(|c| !matches!(c, '|' | '"' | '\0')).collect();
+        Some(text.trim().to_owned()).filter(|text| !text.is_empty())
+    }
+
+    /// A projection that the keys themselves define over a geographic system of the register, as WKT: transverse Mercator
+    /// and Lambert's cone (GeoTIFF 1.0, section 6.3.3.3); `None` for others.
+    fn own_projection(&self, unit_m: f64) -> Option<String> {
+        let in_degrees = matches!(self.code(2054), None | Some(9102));
+        let base = definition(&self.code(2048)?.to_string()).filter(|_| in_degrees)?;
+        let origin = [
+            ("latitude_of_origin", 3081),
+            ("central_meridian", 3080),
+            ("scale_factor", 3092),
+        ];
+        let shift = [("false_easting", 3082), ("false_northing", 3083)];
+        let cone = [
+            ("standard_parallel_1", 3078),
+            ("standard_parallel_2", 3079),
+            ("latitude_of_origin", 3085),
+            ("central_meridian", 3084),
+            ("false_easting", 3086),
+            ("false_northing", 3087),
+        ];
+        let (method, keys) = match self.code(3075)? {
+            1 => ("Transverse_Mercator", [&origin[..], &shift].concat()),
+            8 => ("Lambert_Conformal_Conic_2SP", cone.to_vec()),
+            9 => ("Lambert_Conformal_Conic_1SP", [&origin[..], &shift].concat()),
+            _ => return None,
+        };
+        let mut parameters = String::new();
+        for (name, key) in keys {
+            parameters += &format!("PARAMETER[\"{name}\",{}],", self.double(key)?);
+        }
+        let name = self.text(3073).or_else(|| self.text(1026));
+        let name = name.unwrap_or_else(|| "user-defined".to_owned());
+        Some(format!(
+            "PROJCS[\"{name}\",{base},PROJECTION[\"{method}\"],{parameters}UNIT[\"{}\",{unit_m}]]",
+            if unit_m == 1.0 { "metre" } else { "unit" }
+        ))
     }
 
     /// Size of a unit, by its code or, where that is user-defined, by the key of its size.
@@ -175,6 +225,8 @@ impl Keys {
             _ => (3076, 3077),
         };
         let (plane_m, height_m) = (self.unit_m(plane, Some(size))?, self.unit_m(4099, None)?);
+        let is_own = is_projected && self.code(3072) == Some(USER_DEFINED);
+        let text = text.or_else(|| self.own_projection(plane_m.unwrap_or(1.0)).filter(|_| is_own));
         let own = match (&text, plane_m) {
             (Some(text), None) => Units::of(text)?,
             // The unit of the heights is that of their system.
@@ -218,6 +270,68 @@ mod tests {
         let words = [1, 1, 0, keys.len() as u16].into_iter().chain(entries);
         record.data = words.flat_map(u16::to_le_bytes).collect();
         record
+    }
+
+    /// UTM zone 17 by its parameters (EPSG:26917), in metres and in feet.
+    #[test]
+    fn a_projection_of_its_own_is_that_of_its_parameters() {
+        let place = |text: &str| {
+            let system = MapSystem::parse(&crate::crs::in_metres(text)).unwrap().unwrap();
+            let crate::crs::Coordinates::Projected(projection) = system.coordinates else {
+                panic!("not projected: {text}");
+            };
+            let at = crate::crs::Geodetic {
+                latitude: 0.7,
+                longitude: -1.42,
+                height_m: 0.0,
+            };
+            projection.forward(&system.ellipsoid, &at)
+        };
+        for (code, unit_m) in [(9001, 1.0), (9002, 0.3048)] {
+            let values = [0.0, -81.0, 0.9996, 500_000.0 / unit_m, 0.0];
+            let named = "My dam|";
+            let entries: Vec<[u16; 4]> = [
+                (1024, 1),
+                (2048, 4269),
+                (3072, USER_DEFINED),
+                (3075, 1),
+                (3076, code),
+            ]
+            .map(|(key, value)| [key, 0, 1, value])
+            .into_iter()
+            .chain(
+                [3081, 3080, 3092, 3082, 3083]
+                    .into_iter()
+                    .zip(0..)
+                    .map(|(key, at)| [key, DOUBLES, 1, at]),
+            )
+            .chain([[3073, TEXTS, named.len() as u16, 0]])
+            .collect();
+            let words = [1, 1, 0, entries.len() as u16]
+                .into_iter()
+                .chain(entries.into_iter().flatten());
+            let record = |record_id, data| Vlr {
+                record_id,
+                data,
+                ..key_record(0)
+            };
+            let records = [
+                record(KEYS, words.flat_map(u16::to_le_bytes).collect()),
+                record(DOUBLES, values.into_iter().flat_map(f64::to_le_bytes).collect()),
+                record(TEXTS, named.into()),
+            ];
+            let system = named_system(records.iter()).unwrap();
+            assert_eq!(system.units, units(unit_m, unit_m));
+            let text = system.text.unwrap();
+            assert_eq!(Crs::parse(&text).unwrap().name, "My dam");
+            let (found, expected) = (place(&text), place("EPSG:26917"));
+            assert!(
+                (found[0] - expected[0]).hypot(found[1] - expected[1]) < 1e-6,
+                "{found:?} {expected:?}"
+            );
+            // Without a parameter nothing is named.
+            assert_eq!(named_system(records[..1].iter()).unwrap().text, None);
+        }
     }
 
     fn units(plane_m: f64, height_m: f64) -> Units {
