@@ -59,6 +59,18 @@ messages! {
                 each cloud only once",
             "{share} % der Punkte sind doppelt vorhanden und würden doppelt zählen; die Intervalle der Bewegungen wären dann zu klein: \
              jede Punktwolke nur einmal angeben";
+        LIES_FLAT = "lies-flat": "nearly all surfaces lie flat, and {share} % of the points are on steep ones: a wall stands. If the wall lies on its back, \
+                    Y points up in the cloud: export it with Z up, cameras included",
+            "fast alle Flächen liegen waagrecht, {share} % der Punkte auf steilen: eine Mauer steht. Liegt sie auf dem Rücken, zeigt in der \
+             Punktwolke Y nach oben: sie mit Z nach oben ausgeben, samt den Kameras";
+        NORTH_FIRST = "axis-order": "X is where northings are and Y where eastings are: if X points north, as for German surveyors, exchange both, or the wall \
+                      is mirrored",
+            "X liegt bei Hochwerten und Y bei Rechtswerten: zeigt X nach Norden, wie bei deutschen Vermessern, beide tauschen, sonst ist die \
+             Mauer gespiegelt";
+        MIRRORED = "mirrored-cloud": "the relief of the wall is the mirror image of that of the first epoch (correlation {mirrored}, unmirrored {plain}): an axis of \
+                   one epoch points the wrong way, or two are exchanged (such as X and Y); export its cloud again",
+            "das Relief der Mauer ist das Spiegelbild dessen der ersten Epoche (Korrelation {mirrored}, ungespiegelt {plain}): eine Achse einer \
+             Epoche zeigt in die falsche Richtung, oder zwei sind vertauscht (etwa X und Y); ihre Punktwolke neu ausgeben";
         ROUGH = "rounded-coordinates": "the coordinates are in steps of {step} mm, which adds {noise} mm to the noise of the points: export them with more digits if \
                 the scanner measures better",
             "die Koordinaten sind in Schritten von {step} mm angegeben, was dem Rauschen der Punkte {noise} mm hinzufügt: sie mit mehr Stellen \

@@ -2,7 +2,7 @@
 
 use super::finding::{Finding, Verdict};
 use super::photos::{PosedPhoto, some};
-use crate::Epoch;
+use crate::{Epoch, Project};
 use rayon::prelude::*;
 use stonewise_base::error::{Error, Result};
 use stonewise_base::messages::Said;
@@ -19,6 +19,29 @@ enum Masks {
     Missing(String),
     /// Photo, and why they cannot be used.
     Broken(String, String),
+}
+
+/// Says once of a survey what is the same mistake in several epochs: one mask in each photo.
+pub(super) fn say_once(project: &Project, findings: &mut Vec<Finding>) {
+    let is_that = |f: &Finding| f.code.as_deref() == ONE_MASK_EACH.code && f.verdict == Verdict::Doubt;
+    let epochs: Vec<String> = findings
+        .iter()
+        .filter(|f| is_that(f))
+        .map(|f| f.epoch.clone())
+        .collect();
+    if epochs.len() < 2 {
+        return;
+    }
+    findings.retain(|f| !is_that(f));
+    let masks = project
+        .epochs
+        .iter()
+        .filter(|e| epochs.contains(&e.name))
+        .filter_map(|e| e.masks.as_ref());
+    let mut files: Vec<String> = masks.map(|file| file.display().to_string()).collect();
+    files.dedup();
+    let text = ONE_MASK_EACH.say(&[("file", files.join(", ").into())]);
+    findings.push(Finding::new("", &MASKS, Verdict::Doubt, text));
 }
 
 /// Decodes the masks of every photo that is there, as a run will.

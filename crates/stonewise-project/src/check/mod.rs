@@ -6,6 +6,7 @@ mod clouds;
 mod depth;
 mod edges;
 mod finding;
+mod handed;
 mod likeness;
 mod masks;
 mod origin;
@@ -88,6 +89,7 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
         progress.advance(1);
     }
 
+    masks::say_once(project, &mut report.findings);
     report.findings.extend(unreadable.findings);
     report.findings.extend(clouds::look(project, &surveys));
     // What cannot be read is named above.
@@ -95,6 +97,7 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
         .findings
         .extend(origin::look(project, &surveys).unwrap_or_default());
     report.findings.extend(repeats::look(project, &surveys));
+    report.findings.extend(handed::look(project, &surveys));
     report.findings.extend(stable::look(project, &surveys));
 
     if surveys.iter().all(Option::is_some) {

@@ -9,6 +9,7 @@ use crate::texts::notices::NO_MASKS;
 use crate::warnings::Warnings;
 use rayon::prelude::*;
 use std::path::Path;
+use stonewise_base::messages::findings::ONE_MASK_EACH;
 use stonewise_io::masks::{MaskSource, write_label_png};
 
 /// Brings the masks of every posed photo of an epoch into one label image each.
@@ -50,12 +51,10 @@ pub fn write_labels(
         })
         .collect::<Result<Vec<_>>>()?;
 
-    let mut photos = Vec::new();
+    let (mut photos, mut odd) = (Vec::new(), Vec::new());
     for ((view, path), labelled) in candidates.into_iter().zip(read) {
         let Some(labelled) = labelled else { continue };
-        for warning in labelled.warnings {
-            warnings.notice(STEP, path.to_string_lossy(), warning);
-        }
+        odd.extend(labelled.warnings);
         write_label_png(&label_path(step, photos.len()), &labelled.labels)?;
         let instances = labelled.instances.into_iter().map(Instance::from).collect();
         photos.push(VotingPhoto {
@@ -68,6 +67,21 @@ pub fn write_labels(
         });
     }
 
+    let file = masks.to_string_lossy();
+    if let Some(first) = odd.first() {
+        let more = match odd.len() {
+            1 => String::new(),
+            n => format!("; {} more of its remarks on photos are alike", n - 1),
+        };
+        warnings.notice(STEP, file.clone(), format!("{first}{more}"));
+    }
+    if photos.len() > 1 && photos.iter().all(|photo| photo.instances.len() <= 1) {
+        warnings.doubt(
+            STEP,
+            file.clone(),
+            ONE_MASK_EACH.say(&[("file", (&*file).into())]),
+        );
+    }
     check_any(&photos, epoch, warnings)?;
     Ok(photos)
 }
