@@ -332,6 +332,8 @@ export interface State {
   readonly project_file?: string | null;
   /** The number of the project file's version: it changes with every change of the file. */
   readonly project_version: string;
+  /** Whether that is so because the project lies outside the folder that was opened; `POST /allow` ends it. */
+  readonly read_only: boolean;
   /** When the report was written, a number that changes with it; absent where there is none. */
   readonly report?: string | null;
   /** Where results go. */

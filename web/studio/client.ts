@@ -32,6 +32,7 @@ async function send(method: Method, path: string, body?: unknown): Promise<Respo
 export const server = {
   schema: () => call<Readonly<Record<string, unknown>>>("GET", "/schema"),
   project: () => call<ProjectShown>("GET", "/project"),
+  allow: () => call<State>("POST", "/allow"),
   init: () => call<ProjectShown>("POST", "/project"),
   change: (changes: ProjectChanges) => call<ProjectShown>("PATCH", "/project", changes),
   stable: (area: NewStable) => call<ProjectShown>("POST", "/stable", area),

@@ -2,7 +2,7 @@
 
 import { el } from "../src/dom.ts";
 import type { State } from "./api.ts";
-import { Live } from "./client.ts";
+import { Live, server } from "./client.ts";
 import { isAtWork, type Page } from "./page.ts";
 import { resultsPage } from "./results.ts";
 import { runPage } from "./run.ts";
@@ -22,11 +22,12 @@ function start(root: HTMLElement): void {
   const title = el("span", { class: "structure" });
   const progress = el("span", { class: "chip", hidden: true });
   const view = el("span", { class: "chip", hidden: true }, tx("viewOnly"));
+  const outside = el("div", { class: "banner", role: "alert", hidden: true });
   const main = el("main", { id: "page", tabindex: -1 });
   root.append(
     el("header", { class: "bar" }, el("strong", {}, "stonewise"), title,
       el("nav", { "aria-label": tx("pages") }, ...links.values()), progress, view),
-    lost, main,
+    lost, outside, main,
   );
 
   let shown: Name | null = null, ends = new AbortController();
@@ -50,11 +51,22 @@ function start(root: HTMLElement): void {
   live.watch((state) => {
     title.textContent = structure(state);
     view.hidden = !state.view;
+    if (outside.hidden === state.read_only) outside.replaceChildren(tx("projectOutside", { file: state.project_file ?? "" }), " ", allow());
+    outside.hidden = !state.read_only;
     progress.hidden = !isAtWork(state);
     const ended = state.run.steps.filter((s) => s.state === "done" || s.state === "earlier").length;
     if (isAtWork(state)) progress.textContent = `${tx(state.run.job === "teach" ? "training" : "run")} ${ended}/${state.run.steps.length}`;
     if (!shown) show();
   }, new AbortController().signal);
+}
+
+/** A button that allows changes; the pages are made anew with their tools. */
+function allow(): HTMLButtonElement {
+  const button = el("button", { type: "button" }, tx("allowChanges"));
+  button.addEventListener("click", () => {
+    server.allow().then(() => location.reload()).catch((error: unknown) => (button.textContent = (error as Error).message));
+  });
+  return button;
 }
 
 /** The page to begin with: the results where there are some. */

@@ -7,7 +7,7 @@ import { Squares } from "../src/geometry.ts";
 import { Photos } from "../src/views/photos.ts";
 import type { Action, Change, Edit, EditsShown, ProjectShown, State, StoneChange } from "./api.ts";
 import { changeList, countChanges } from "./changes.ts";
-import { type Live, newId, server } from "./client.ts";
+import { type Live, newId, Refused, server } from "./client.ts";
 import { compared } from "./compared.ts";
 import { type Area, Face, type Point, rectangle } from "./face.ts";
 import { isAtWork, type Page } from "./page.ts";
@@ -58,6 +58,9 @@ export const stonesPage: Page = (place, live, until) => {
     })();
   }, until);
 };
+
+/** Acts whose author is not named yet, the oldest first: they outlive the page that they were drawn on. */
+const kept: (readonly Edit[])[] = [];
 
 /** Everything of the page for one state of the results. */
 class Room {
@@ -118,6 +121,7 @@ class Room {
     for (const [input, key] of [[this.#who, "who"], [this.#why, "why"]] as const) {
       input.addEventListener("input", () => localStorage.setItem(key, input.value));
     }
+    this.#who.addEventListener("change", () => this.#sign());
     live.watch((state) => this.#told(state), until);
     this.#show();
     this.#showSelection();
@@ -227,7 +231,7 @@ class Room {
     this.#undo.disabled = this.#isFixed || !can_undo;
     this.#redo.disabled = this.#isFixed || !can_redo;
     const pending = edits.filter((edit) => Date.parse(edit.when) > this.#made);
-    this.#face.pending = pending;
+    this.#face.pending = [...pending, ...kept.flat()];
     this.#list.replaceChildren(...[...edits].reverse().map((edit) =>
       el("li", {}, `${tx(`do_${edit.do}`)}, ${edit.who}, ${moment(edit.when)}: ${edit.why}`, pending.includes(edit) ? el("span", { class: "chip" }, tx("pending")) : null)));
     if (edits.length === 0) this.#list.replaceChildren(el("li", { class: "note" }, tx("noEdits")));
@@ -266,7 +270,7 @@ class Room {
     const status = document.statuses[stones.state[only]!];
     const facts = [`${fixed(stones.area[only]!, 3)} m²`, `${fixed(100 * stones.confidence[only]!, 0)} %`, status?.meaning ?? ""];
     const photos = this.#photos.of(only), { epochs } = this.#project;
-    this.#selection.replaceChildren(head, el("p", { class: "note" }, facts.join(", ")),
+    this.#selection.replaceChildren(head, el("p", { class: "note" }, facts.join(", ")), el("p", { class: "note" }, tx("selectMore")),
       ...(photos ? [el("h3", { class: "unseen" }, tx("stone", { id: stones.id[only]! })), photos] : []),
       ...(epochs.some((epoch) => epoch.photos > 0) ? [sightingsOf(stones.id[only]!, epochs, (message) => this.#fail(message))] : []));
   }
@@ -401,14 +405,23 @@ class Room {
   }
 
   #add(edits: readonly Edit[]): void {
-    if (!this.#who.value.trim()) {
-      this.#fail(tx("whoMissing"));
-      return this.#who.focus();
-    }
-    const id = newId();
-    this.#send(() => server.edit({ id, edits }));
+    kept.push(edits);
     this.#face.selected.clear();
     this.#showSelection();
+    this.#sign();
+    if (kept.length === 0) return;
+    this.#fail(tx("whoMissing"));
+    this.#who.focus();
+  }
+
+  /** Sends what was done before its author was named, once that is so. */
+  #sign(): void {
+    const who = this.#who.value.trim();
+    for (const edits of who ? kept.splice(0) : []) {
+      const id = newId();
+      this.#send(() => server.edit({ id, edits: edits.map((edit) => ({ ...edit, who })) }), edits);
+    }
+    this.#show();
   }
 
   #step(act: (id: string) => Promise<EditsShown>): void {
@@ -416,13 +429,15 @@ class Room {
     this.#send(() => act(id));
   }
 
-  #send(act: () => Promise<EditsShown>): void {
+  /** Sends an act; what was drawn is kept where the server does not answer. */
+  #send(act: () => Promise<EditsShown>, drawn?: readonly Edit[]): void {
     this.#line = this.#line.then(async () => {
       this.#error.hidden = true;
       try {
         this.#edits = await act();
         this.#show();
       } catch (error) {
+        if (drawn && !(error instanceof Refused)) kept.push(drawn);
         this.#fail((error as Error).message);
       }
     });

@@ -8,6 +8,8 @@ const TEXTS = {
   "stones": ["Stones", "Steine"],
   "results": ["Results", "Ergebnisse"],
   "viewOnly": ["only for looking", "nur zum Ansehen"],
+  "projectOutside": ["The project lies outside the folder that was opened: {file}. Changes here would change that project.", "Das Projekt liegt außerhalb des geöffneten Ordners: {file}. Änderungen hier würden jenes Projekt ändern."],
+  "allowChanges": ["Allow changes", "Änderungen erlauben"],
   "connectionLost": ["The studio does not answer: it has ended, or the connection is interrupted.", "Das Studio antwortet nicht: Es ist beendet, oder die Verbindung ist unterbrochen."],
   "loading": ["Loading …", "Wird geladen …"],
 
@@ -143,7 +145,7 @@ const TEXTS = {
   "applying": ["Edits are being applied …", "Korrekturen werden angewandt …"],
   "who": ["Who", "Wer"],
   "why": ["Why", "Warum"],
-  "whoMissing": ["Say who decides.", "Angeben, wer entscheidet."],
+  "whoMissing": ["Say who decides: what was drawn is kept until then.", "Angeben, wer entscheidet: Gezeichnetes bleibt bis dahin erhalten."],
   "whySeen": ["seen in the photo", "im Foto gesehen"],
   "queue": ["Worth a look", "Einen Blick wert"],
   "queueEmpty": ["No stone stands out.", "Kein Stein fällt auf."],
@@ -154,6 +156,7 @@ const TEXTS = {
   "unlike": ["{times} times the area of the stones around it", "{times}-fache Fläche der Steine ringsum"],
   "fewPhotos": ["seen in one photo", "in einem Foto gesehen"],
   "selected": ["Selected: {list}", "Gewählt: {list}"],
+  "selectMore": ["With Shift, a click selects a second stone.", "Mit Umschalt wählt ein Klick einen zweiten Stein dazu."],
   "nothingSelected": ["No stone is selected.", "Kein Stein ist gewählt."],
   "stone": ["Stone {id}", "Stein {id}"],
   "edits": ["Corrections", "Korrekturen"],
@@ -210,7 +213,7 @@ const TEXTS = {
   "wallFace": ["The face of the wall with the outlines of the stones", "Die Mauerfläche mit den Umrissen der Steine"],
   "behind": ["behind", "dahinter"],
   "needsSelection": ["Select the stone first.", "Erst den Stein wählen."],
-  "needsTwo": ["Select two stones at least.", "Mindestens zwei Steine wählen."],
+  "needsTwo": ["Select two stones at least: click one, then others with Shift.", "Mindestens zwei Steine wählen: einen anklicken, dann weitere mit Umschalt."],
   "loadingStones": ["The stones are being loaded …", "Die Steine werden geladen …"],
 } as const;
 

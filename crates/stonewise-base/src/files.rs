@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fs;
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 
 /// Makes the folder for the results, where it is not there yet.
 ///
@@ -31,6 +31,34 @@ pub fn write_text(path: &Path, text: &str) -> Result<()> {
 /// It cannot be looked at.
 pub fn is_there(path: &Path) -> Result<bool> {
     path.try_exists().map_err(Error::io("accessing", path))
+}
+
+/// The canonical path of a file or folder that need not exist: the part that exists without links, the rest
+/// appended.
+pub fn resolved(path: &Path) -> PathBuf {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let mut rest = Vec::new();
+    let mut known = path.as_path();
+    loop {
+        if let Ok(canonical) = known.canonicalize() {
+            return rest.iter().rev().fold(canonical, |p, name| p.join(name));
+        }
+        let (Some(parent), Some(name)) = (known.parent(), known.file_name()) else {
+            return path;
+        };
+        rest.push(name.to_owned());
+        known = parent;
+    }
+}
+
+/// The way from a folder to a file, neither of which need exist; `None` where there is none, such as from one drive of
+/// Windows to another.
+pub fn relative(folder: &Path, file: &Path) -> Option<PathBuf> {
+    let (from, to) = (resolved(folder), resolved(file));
+    let pairs = from.components().zip(to.components());
+    let shared = pairs.take_while(|(a, b)| a == b).count();
+    let up = from.components().skip(shared).map(|_| Component::ParentDir);
+    (shared > 0).then(|| up.chain(to.components().skip(shared)).collect())
 }
 
 /// Reads a file as it is.

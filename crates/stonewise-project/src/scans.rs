@@ -5,7 +5,7 @@ use crate::init::quoted;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::{Error, Result};
-use stonewise_base::files::write_text;
+use stonewise_base::files::{relative, write_text};
 use stonewise_io::cloud::CloudFormat;
 
 /// Whether a file is a point cloud, and no project.
@@ -39,22 +39,27 @@ impl ScansProject {
             .iter()
             .map(|scan| dunce::canonicalize(scan).map_err(Error::io("finding", scan)))
             .collect::<Result<_>>()?;
-        if path.exists() {
-            let project = Project::read(&path)?;
-            let named: Vec<PathBuf> = project.epochs.iter().flat_map(|e| e.clouds.clone()).collect();
-            if named != scans {
-                let message =
-                    "this is the project of other scans: run it itself, or give another --out".to_owned();
-                return Err(Error::Input { path, message });
-            }
-            let text = std::fs::read_to_string(&path).map_err(Error::io("reading", &path))?;
-            return Ok(Self { project, text });
+        if !path.exists() {
+            // The folder, from which the ways lead, may not be there yet.
+            return Ok(Self {
+                project: Project::parse(&path, &text_of(&scans, |scan| scan.to_path_buf()))?,
+                text: text_of(&scans, |scan| {
+                    relative(dir, scan).unwrap_or_else(|| scan.to_path_buf())
+                }),
+            });
         }
-        let text = text_of(&scans);
-        Ok(Self {
-            project: Project::parse(&path, &text)?,
-            text,
-        })
+        let text = std::fs::read_to_string(&path).map_err(Error::io("reading", &path))?;
+        let mut project = Project::parse(&path, &text)?;
+        for cloud in project.epochs.iter_mut().flat_map(|epoch| &mut epoch.clouds) {
+            *cloud = dunce::canonicalize(&*cloud).map_err(Error::io("finding", cloud))?;
+        }
+        let named: Vec<&PathBuf> = project.epochs.iter().flat_map(|e| &e.clouds).collect();
+        if named != scans.iter().collect::<Vec<_>>() {
+            let message =
+                "this is the project of other scans: run it itself, or give another --out".to_owned();
+            return Err(Error::Input { path, message });
+        }
+        Ok(Self { project, text })
     }
 
     /// Writes the project file, into a folder that exists.
@@ -66,14 +71,15 @@ impl ScansProject {
     }
 }
 
-fn text_of(scans: &[PathBuf]) -> String {
+/// The project file; `way`: how it names a scan.
+fn text_of(scans: &[PathBuf], way: impl Fn(&Path) -> PathBuf) -> String {
     let names = names(scans);
     let mut text = String::from(
         "# Written by `stonewise run`; your changes are kept. All keys: `stonewise self schema`.\n[project]\n",
     );
     let _ = writeln!(text, "name = {}", quoted(&title(&names)));
     for (name, scan) in names.iter().zip(scans) {
-        let scan = quoted(&scan.to_string_lossy());
+        let scan = quoted(&way(scan).to_string_lossy());
         let _ = writeln!(text, "\n[[epochs]]\nname = {}\nclouds = [{scan}]", quoted(name));
     }
     text
@@ -132,6 +138,27 @@ mod tests {
             path
         };
         names.iter().map(write).collect()
+    }
+
+    #[test]
+    fn scans_and_results_move_together() {
+        let dir = tempfile::tempdir().unwrap();
+        let (here, there) = (dir.path().join("here"), dir.path().join("there"));
+        let paths = scans(&here, &["a.xyz", "b.xyz"]);
+        let made = ScansProject::new(&paths, &here.join("out")).unwrap();
+        assert!(made.text.contains("clouds = [\"../a.xyz\"]"), "{}", made.text);
+        fs::create_dir(here.join("out")).unwrap();
+        made.write().unwrap();
+        fs::rename(&here, &there).unwrap();
+        let project = Project::read(&there.join("out/stonewise.toml")).unwrap();
+        let clouds: Vec<PathBuf> = project
+            .epochs
+            .iter()
+            .map(|e| e.clouds[0].canonicalize().unwrap())
+            .collect();
+        let moved = ["a.xyz", "b.xyz"].map(|name| there.join(name).canonicalize().unwrap());
+        assert_eq!(clouds, moved);
+        assert!(ScansProject::new(&moved, &there.join("out")).is_ok());
     }
 
     #[test]

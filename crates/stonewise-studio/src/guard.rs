@@ -5,6 +5,7 @@
 //! Sec-Fetch-Site) and bring a cookie that only the secret of the first address gives.
 
 use crate::http::{Body, Head, Method, Response};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Digits of a secret: 256 bits.
@@ -12,6 +13,9 @@ const DIGITS: usize = 64;
 
 /// The media type of all bodies; forms of other sites cannot send it.
 const JSON: &str = "application/json";
+
+/// What the page calls to change a project outside the folder that was opened.
+pub const ALLOW: &str = "/api/v1/allow";
 
 /// What stands in front of every answer.
 pub struct Guard {
@@ -23,6 +27,8 @@ pub struct Guard {
     once: Mutex<Option<Secret>>,
     session: Secret,
     is_view: bool,
+    /// Nothing can be changed until the page asks for it.
+    is_read_only: AtomicBool,
 }
 
 /// A random text that is compared in constant time.
@@ -42,14 +48,15 @@ impl Secret {
 }
 
 impl Guard {
-    /// For a server on this port; `is_view`: nothing can be changed.
-    pub fn new(port: u16, is_view: bool) -> Self {
+    /// For a server on this port; `is_view`: nothing can be changed; `is_read_only`: not until [`Guard::allow`].
+    pub fn new(port: u16, is_view: bool, is_read_only: bool) -> Self {
         Self {
             port,
             told: Secret::new(),
             once: Mutex::new(Some(Secret::new())),
             session: Secret::new(),
             is_view,
+            is_read_only: AtomicBool::new(is_read_only),
         }
     }
 
@@ -67,6 +74,16 @@ impl Guard {
     /// Whether nothing can be changed.
     pub fn is_view(&self) -> bool {
         self.is_view
+    }
+
+    /// Whether nothing can be changed before [`Guard::allow`].
+    pub fn is_read_only(&self) -> bool {
+        self.is_read_only.load(Ordering::SeqCst)
+    }
+
+    /// Lets the page change the project, although that lies outside the folder that was opened.
+    pub fn allow(&self) {
+        self.is_read_only.store(false, Ordering::SeqCst);
     }
 
     fn address_with(&self, secret: &str) -> String {
@@ -97,6 +114,12 @@ impl Guard {
         }
         if self.is_view {
             return Err(Response::error(403, "this page is only for looking (--view)"));
+        }
+        if self.is_read_only() && head.path != ALLOW {
+            return Err(Response::error(
+                403,
+                "the project lies outside the folder that was opened: allow changes on the page first",
+            ));
         }
         let kind = head.header("content-type").unwrap_or("");
         if kind != JSON && !kind.starts_with("application/json;") {

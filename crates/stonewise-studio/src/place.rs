@@ -20,6 +20,8 @@ pub struct Place {
     pub project: Option<PathBuf>,
     /// The folder of the results, which need not be there yet.
     pub results: PathBuf,
+    /// The results were opened, and their project lies outside their folder: they may be a copy.
+    pub is_project_outside: bool,
 }
 
 impl Place {
@@ -33,8 +35,10 @@ impl Place {
             return Ok(Self::of_project(path));
         }
         if is_results(&path) {
+            let project = project_of(&path);
             return Ok(Self {
-                project: project_of(&path),
+                is_project_outside: project.as_ref().is_some_and(|p| !p.starts_with(&path)),
+                project,
                 results: path,
             });
         }
@@ -49,6 +53,7 @@ impl Place {
         Self {
             project: Some(project),
             results,
+            is_project_outside: false,
         }
     }
 
@@ -100,17 +105,11 @@ fn is_unfinished(folder: &Path) -> bool {
 /// The project that results name, if it is still there.
 fn project_of(results: &Path) -> Option<PathBuf> {
     let marker = results.join(WORK_DIR).join(MARKER_FILE);
-    let named =
-        named_in(&results.join(RUN), "/project/file").or_else(|| named_in(&marker, "/owner/identity"))?;
-    // A folder that was moved together with its survey: the usual places beside it.
-    let file_name = named.file_name()?.to_owned();
-    let beside = results.parent().map(|p| p.join(&file_name));
-    let inside = results.join("survey").join(&file_name);
-    let found = [Some(named.clone()), beside, Some(inside)]
-        .into_iter()
-        .flatten()
-        .find(|p| p.is_file());
-    found?.canonicalize().ok()
+    let named = named_in(&results.join(RUN), "/project/file")
+        .or_else(|| named_in(&marker, "/relative"))
+        .or_else(|| named_in(&marker, "/owner/identity"))?;
+    let project = results.join(named).canonicalize().ok()?;
+    project.is_file().then_some(project)
 }
 
 /// The path that a JSON file holds at a place.
@@ -160,6 +159,7 @@ mod tests {
         let expected = Place {
             project: Some(project.clone()),
             results: root.join(RESULTS_DIR),
+            is_project_outside: false,
         };
         assert_eq!(Place::of(&root).unwrap(), expected);
         fs::write(&project, "").unwrap();
@@ -167,25 +167,33 @@ mod tests {
         let results = root.join("out");
         fs::create_dir_all(results.join("data")).unwrap();
         fs::write(results.join("data/stones.parquet"), "").unwrap();
-        let record = serde_json::json!({ "project": { "file": project } });
+        let record = serde_json::json!({ "project": { "file": "../stonewise.toml" } });
         fs::write(results.join("run.json"), record.to_string()).unwrap();
         let expected = Place {
             project: Some(project.clone()),
             results: results.clone(),
+            is_project_outside: true,
         };
         assert_eq!(Place::of(&results).unwrap(), expected);
         // While a run works, results lie aside.
         fs::remove_file(results.join("run.json")).unwrap();
         fs::create_dir(results.join(WORK_DIR)).unwrap();
         fs::write(results.join(UNFINISHED_FILE), "").unwrap();
-        let marker = serde_json::json!({ "owner": { "kind": "project", "identity": project } });
+        let marker =
+            serde_json::json!({ "owner": { "kind": "project", "identity": project }, "relative": null });
         fs::write(results.join(WORK_DIR).join(MARKER_FILE), marker.to_string()).unwrap();
         assert_eq!(Place::of(&results).unwrap(), expected);
-        fs::remove_file(project).unwrap();
-        assert_eq!(Place::of(&results).unwrap().project, None);
         let older = root.join("older");
         fs::create_dir(&older).unwrap();
         fs::write(older.join("stones.parquet"), "").unwrap();
         assert!(Place::of(&older).unwrap_err().to_string().contains("run again"));
+        // A copy in another place does not reach back to the original.
+        let marker = serde_json::json!({ "owner": { "identity": project }, "relative": "../stonewise.toml" });
+        fs::write(results.join(WORK_DIR).join(MARKER_FILE), marker.to_string()).unwrap();
+        assert_eq!(Place::of(&results).unwrap(), expected);
+        let copy = root.join("elsewhere/out");
+        fs::create_dir(root.join("elsewhere")).unwrap();
+        fs::rename(&results, &copy).unwrap();
+        assert_eq!(Place::of(&copy).unwrap().project, None);
     }
 }

@@ -29,7 +29,10 @@ impl Studio {
     pub fn open(path: &Path, port: u16, is_view: bool) -> io::Result<Self> {
         let place = Place::of(path)?;
         let listener = Listener::bind(port)?;
-        let api = Api::new(Guard::new(listener.port(), is_view), place);
+        let api = Api::new(
+            Guard::new(listener.port(), is_view, place.is_project_outside),
+            place,
+        );
         listener.serve(Arc::new(Served(Arc::clone(&api))))?;
         Ok(Self { api })
     }

@@ -57,7 +57,7 @@ pub struct RunRecord {
 pub struct ProjectRecord {
     /// Name of the structure.
     pub name: String,
-    /// The project file.
+    /// The project file, from the folder of the results; its whole path where there is no such way.
     pub file: PathBuf,
 }
 

@@ -188,6 +188,11 @@ impl Api {
         match (head.method, call) {
             (Get, "/state") => Ok(Response::json(200, &self.state())),
             (Get, "/events") => self.events(),
+            (Post, "/allow") => {
+                self.guard.allow();
+                self.run.touch();
+                Ok(Response::json(200, &self.state()))
+            }
             (Get, "/schema") => Ok(Response::json(200, &project_schema())),
             (Get, "/project") => Ok(Response::json(200, &self.project_shown())),
             (Post, "/project") => self.init_project(),
@@ -341,7 +346,8 @@ impl Api {
         let run = self.run.shown().0;
         let is_newer = |path: PathBuf| written.is_some() && changed(&path) > written;
         State {
-            view: self.guard.is_view(),
+            view: self.guard.is_view() || self.guard.is_read_only(),
+            read_only: self.guard.is_read_only(),
             project_file: project.map(|p| p.display().to_string()),
             results_folder: results.display().to_string(),
             has_project: self.has_project(),

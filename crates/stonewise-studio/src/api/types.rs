@@ -15,6 +15,8 @@ use stonewise::edits::Edit;
 pub struct State {
     /// Whether nothing can be changed.
     pub view: bool,
+    /// Whether that is so because the project lies outside the folder that was opened; `POST /allow` ends it.
+    pub read_only: bool,
     /// The project file, and the folder of the results.
     pub project_file: Option<String>,
     /// Where results go.

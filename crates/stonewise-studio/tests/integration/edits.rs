@@ -92,6 +92,43 @@ fn results_whose_project_is_gone_have_no_edits() {
 }
 
 #[test]
+fn a_project_outside_the_opened_results_changes_only_when_told_so() {
+    let dir = crate::support::survey();
+    let copy = dir.path().join("copy");
+    fs::create_dir(&copy).unwrap();
+    fs::write(
+        copy.join("run.json"),
+        json!({ "project": { "file": "../stonewise.toml" } }).to_string(),
+    )
+    .unwrap();
+    fs::write(copy.join("stones.parquet"), "").unwrap();
+    let studio = Tested::at(dir, "copy", false);
+    let state = studio.get("/api/v1/state").json();
+    assert_eq!(
+        (&state["read_only"], &state["view"], &state["has_project"]),
+        (&json!(true), &json!(true), &json!(true))
+    );
+    let change = changes(&json!(["project", "name"]), &json!("changed"));
+    let refused = studio.send("PATCH", "/api/v1/project", &change);
+    assert!(
+        refused.status == 403 && refused.body.contains("outside the folder"),
+        "{}",
+        refused.body
+    );
+    assert!(
+        !fs::read_to_string(studio.path("stonewise.toml"))
+            .unwrap()
+            .contains("changed")
+    );
+    let state = studio.send("POST", "/api/v1/allow", &json!({})).json();
+    assert_eq!(
+        (&state["read_only"], &state["view"]),
+        (&json!(false), &json!(false))
+    );
+    assert_eq!(studio.send("PATCH", "/api/v1/project", &change).status, 200);
+}
+
+#[test]
 fn edits_are_in_the_file_that_the_project_names_before_they_are_answered() {
     let studio = Tested::new();
     with_wall(studio.dir.path());

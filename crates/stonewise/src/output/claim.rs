@@ -1,13 +1,14 @@
 //! An output folder in the hands of one command.
 
 use super::digests::Digests;
-use super::inputs::{refuse_overwriting, resolved};
+use super::inputs::refuse_overwriting;
 use super::lock::FolderLock;
 use super::marker::{self, Found, Owner};
 use super::partials::sweep;
 use super::previous;
 use super::result_names::{is_made_anew, is_result, result_folders};
 use crate::error::{Error, Result};
+use crate::files::resolved;
 use crate::project::Project;
 use crate::results::names::stones_in;
 use std::fs;

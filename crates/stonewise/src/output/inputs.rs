@@ -1,25 +1,8 @@
 //! Inputs must not lie where results go.
 
 use crate::error::{Error, Result};
+use crate::files::resolved;
 use std::path::{Path, PathBuf};
-
-/// The canonical path of a file or folder that need not exist: the part that exists without links, the rest
-/// appended.
-pub(super) fn resolved(path: &Path) -> PathBuf {
-    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
-    let mut rest = Vec::new();
-    let mut known = path.as_path();
-    loop {
-        if let Ok(canonical) = known.canonicalize() {
-            return rest.iter().rev().fold(canonical, |p, name| p.join(name));
-        }
-        let (Some(parent), Some(name)) = (known.parent(), known.file_name()) else {
-            return path;
-        };
-        rest.push(name.to_owned());
-        known = parent;
-    }
-}
 
 /// Refuses an output folder in which results would replace an input, or that lies inside a folder of inputs.
 ///

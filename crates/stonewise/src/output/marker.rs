@@ -1,10 +1,9 @@
 //! Whose results a folder holds.
 
-use super::inputs::resolved;
 use super::lock::LOCK_FILE;
 use super::partials::is_partial;
 use crate::error::{Error, Result};
-use crate::files::write_readable_json;
+use crate::files::{relative, resolved, write_readable_json};
 use crate::project::Project;
 use crate::results::names::WORK_DIR;
 use serde::{Deserialize, Serialize};
@@ -114,7 +113,7 @@ pub(super) fn write(folder: &Path, owner: &Owner) -> Result<()> {
     let marker = Marker {
         stonewise: env!("CARGO_PKG_VERSION").to_owned(),
         owner: owner.clone(),
-        relative: relative(folder, owner),
+        relative: way(folder, owner),
     };
     write_readable_json(&folder.join(WORK_DIR).join(MARKER_FILE), &marker)
 }
@@ -123,29 +122,15 @@ fn is_same(folder: &Path, marker: &Marker, owner: &Owner) -> bool {
     let moved_together = || {
         owner.kind == marker.owner.kind
             && marker.relative.is_some()
-            && marker.relative == relative(folder, owner)
+            && marker.relative == way(folder, owner)
             && !Path::new(&marker.owner.identity).exists()
     };
     (owner.kind == marker.owner.kind && owner.identity == marker.owner.identity) || moved_together()
 }
 
 /// The way from the folder to its project file.
-fn relative(folder: &Path, owner: &Owner) -> Option<PathBuf> {
-    if owner.kind != "project" {
-        return None;
-    }
-    let (from, to) = (resolved(folder), PathBuf::from(&owner.identity));
-    let shared = from
-        .components()
-        .zip(to.components())
-        .take_while(|(a, b)| a == b)
-        .count();
-    let up = from.components().skip(shared).map(|_| Path::new(".."));
-    let down = to
-        .components()
-        .skip(shared)
-        .map(|c| Path::new(c.as_os_str()).to_path_buf());
-    Some(up.map(Path::to_path_buf).chain(down).collect())
+fn way(folder: &Path, owner: &Owner) -> Option<PathBuf> {
+    relative(folder, Path::new(&owner.identity)).filter(|_| owner.kind == "project")
 }
 
 /// Whether nothing is in a folder but what a killed claim left.
@@ -176,12 +161,12 @@ fn recorded_for(folder: &Path, owner: &Owner) -> bool {
     }
     let text = fs::read_to_string(folder.join("run.json")).unwrap_or_default();
     let run: Value = serde_json::from_str(&text).unwrap_or_default();
-    let Some(file) = run["project"]["file"].as_str().map(Path::new) else {
+    let Some(file) = run["project"]["file"].as_str().map(|file| folder.join(file)) else {
         return false;
     };
-    // A relative path may lead nowhere now, because the working folder was another one.
+    // It may lead nowhere, because the folder was moved.
     let project = Path::new(&owner.identity);
-    resolved(file) == project
+    resolved(&file) == project
         || (!file.exists()
             && file.file_name() == project.file_name()
             && Project::name_in(project).as_deref() == run["project"]["name"].as_str())

@@ -71,7 +71,12 @@ impl Tested {
     }
 
     pub fn of(dir: TempDir, is_view: bool) -> Self {
-        let studio = Studio::open(dir.path(), 0, is_view).unwrap();
+        Self::at(dir, "", is_view)
+    }
+
+    /// A studio that opens a folder in this one.
+    pub fn at(dir: TempDir, folder: &str, is_view: bool) -> Self {
+        let studio = Studio::open(&dir.path().join(folder), 0, is_view).unwrap();
         let address = studio.address();
         let rest = address.strip_prefix("http://127.0.0.1:").unwrap();
         let (port, token) = rest.split_once("/?token=").unwrap();

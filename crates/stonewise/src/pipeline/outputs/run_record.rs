@@ -2,7 +2,7 @@
 
 use super::crs::coordinate_system;
 use crate::error::{Error, Result};
-use crate::files::write_readable_json;
+use crate::files::{relative, resolved, write_readable_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::graph::{Need, Run, Step};
 use crate::pipeline::outputs::verdict::VERDICT;
@@ -45,7 +45,7 @@ fn write_run_record(run: &Run) -> Result<()> {
         finished_at: Timestamp::now(),
         project: ProjectRecord {
             name: project.name.clone(),
-            file: project.path.clone(),
+            file: relative(&context.out, &project.path).unwrap_or_else(|| resolved(&project.path)),
         },
         crs: coordinate_system(project)?.map(|crs| CrsRecord {
             epsg: crs.epsg,
