@@ -350,10 +350,11 @@ pub enum ExitOn {
 /// Arguments of `check`.
 #[derive(Debug, ClapArgs)]
 pub struct CheckArgs {
-    /// The project file.
-    pub project: PathBuf,
+    /// The project file, or scans as for `run`.
+    #[arg(required = true, value_name = "PROJECT|SCANS")]
+    pub inputs: Vec<PathBuf>,
     /// Folder the results will go to; the free space on its disk is checked.
-    #[arg(long, value_name = "DIR", default_value = ".")]
+    #[arg(long, value_name = "DIR", default_value = "results")]
     pub out: PathBuf,
     /// The page with pictures (default: a file of its own in the temporary folder, named at the end).
     #[arg(long, value_name = "FILE")]

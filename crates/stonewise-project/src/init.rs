@@ -67,7 +67,8 @@ pub fn init(dir: &Path) -> Result<Initialised> {
     if path.exists() {
         return Err(Error::Output {
             path,
-            message: "a project file already exists; remove it to start over".into(),
+            message: "there is a project file already, which stays as it is: change it in an editor or with `stonewise studio`, and look at the \
+                      survey with `stonewise check`".into(),
         });
     }
     let Proposal { text, lines } = propose(dir)?;

@@ -7,16 +7,19 @@ use crate::stdout::stdout;
 use anyhow::{Result, bail};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use stonewise::Project;
 use stonewise::check::{Depth, Verdict, check as look_at};
+use stonewise::{Project, ScansProject, is_scan};
 
 /// Ends the title of every page that this command writes.
 const TITLE_END: &str = "a look at the survey</title>";
 
 /// Looks at a survey; the table goes to stdout.
 pub fn check(args: &CheckArgs, force: bool, printer: &Printer) -> Result<Outcome> {
-    let project = Project::read(&args.project)?;
-    let page = page_path(args, force)?;
+    let project = match args.inputs.as_slice() {
+        [project] if !is_scan(project) => Project::read(project)?,
+        scans => ScansProject::new(scans, &args.out)?.project,
+    };
+    let page = page_path(args, &project, force)?;
     let report = look_at(&project, &args.out, Depth::Full, printer)?;
     printer.finish();
     write!(stdout(), "{}", report.text())?;
@@ -35,9 +38,9 @@ pub fn check(args: &CheckArgs, force: bool, printer: &Printer) -> Result<Outcome
 
 /// Path of the page: that of the option, else a file of this call's own in the temporary folder, so that nothing is
 /// added to the survey. A file that is there must be an earlier page.
-fn page_path(args: &CheckArgs, force: bool) -> Result<PathBuf> {
+fn page_path(args: &CheckArgs, project: &Project, force: bool) -> Result<PathBuf> {
     let temporary = || {
-        let survey = args.project.file_stem().unwrap_or_default().to_string_lossy();
+        let survey = project.path.file_stem().unwrap_or_default().to_string_lossy();
         std::env::temp_dir().join(format!("{survey}-{}.check.html", std::process::id()))
     };
     let page = args.page.clone().unwrap_or_else(temporary);

@@ -323,6 +323,85 @@ fn usual_slips_in_project_files_are_wrong_usage_with_the_fix() {
     );
 }
 
+/// Two clouds of a small wall with relief, the second of which may be changed.
+fn two_clouds(folder: &Path, change: impl Fn([f64; 3]) -> [f64; 3]) {
+    let wall = |seed: u32| -> Vec<[f64; 3]> {
+        let step = 0.02;
+        let height =
+            |i: u32, j: u32| f64::from((i / 15 * 37 + j / 10 * 101 + i / 15 * (j / 10) * 53) % 17) * 2e-3;
+        let point = |k: u32| {
+            let (i, j) = (k % 150, k / 150);
+            let jitter = f64::from((k * 7919 + seed) % 13) * 1e-4;
+            [
+                height(i, j) + jitter,
+                f64::from(i) * step - 1.5,
+                f64::from(j) * step,
+            ]
+        };
+        (0..150 * 75).map(point).collect()
+    };
+    let write = |name: &str, points: Vec<[f64; 3]>| {
+        let lines: Vec<String> = points
+            .iter()
+            .map(|[x, y, z]| format!("{x:.5} {y:.5} {z:.5}"))
+            .collect();
+        fs::write(folder.join(name), lines.join("\n")).unwrap();
+    };
+    write("a.xyz", wall(0));
+    write("b.xyz", wall(5).into_iter().map(change).collect());
+}
+
+#[test]
+fn check_takes_scans_as_run_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let check = |clouds: &[&str]| {
+        let mut command = stonewise();
+        command.current_dir(folder.path()).arg("check").args(clouds);
+        let output = command.output().unwrap();
+        let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+        (output.status.code(), text.concat())
+    };
+    two_clouds(folder.path(), |p| p);
+    let (code, said) = check(&["a.xyz", "b.xyz"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(
+        said.contains("11250 points") && !said.contains("mirror"),
+        "{said}"
+    );
+    assert!(check(&["a.xyz"]).1.contains("a single scan shows no motion"));
+    assert_eq!(
+        fs::read_dir(folder.path()).unwrap().count(),
+        2,
+        "nothing is written"
+    );
+    // Left and right exchanged.
+    two_clouds(folder.path(), |[x, y, z]| [x, -y, z]);
+    let (code, said) = check(&["a.xyz", "b.xyz"]);
+    assert!(code == Some(3) && said.contains("[mirrored-cloud]"), "{said}");
+    two_clouds(folder.path(), |[x, y, z]| [y, z, x]);
+    let (code, said) = check(&["b.xyz", "b.xyz"]);
+    assert!(code == Some(3) && said.contains("[lies-flat]"), "{said}");
+}
+
+#[test]
+fn init_twice_keeps_the_project_and_run_offers_init() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |arguments: &[&str]| {
+        let mut command = stonewise();
+        command.current_dir(folder.path()).args(arguments);
+        String::from_utf8(command.output().unwrap().stderr).unwrap()
+    };
+    let log = said(&["run", ".", "--out", "results"]);
+    assert!(
+        log.contains("stonewise.toml: no project file") && log.contains("`stonewise init .`"),
+        "{log}"
+    );
+    two_clouds(folder.path(), |p| p);
+    said(&["init", "."]);
+    let log = said(&["init", "."]);
+    assert!(log.contains("stays as it is") && !log.contains("remove"), "{log}");
+}
+
 #[test]
 fn a_project_file_that_is_missing_or_no_text_is_wrong_usage() {
     let folder = tempfile::tempdir().unwrap();
