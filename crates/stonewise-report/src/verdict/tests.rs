@@ -433,7 +433,7 @@ fn fine_needs_the_shape_too() {
     let changed = judge(&bulged(true), &none);
     assert_eq!(codes(&changed), [ReasonCode::DeformationShown]);
     assert_eq!(changed.state, State::Attention);
-    let words = "the wall changed its shape in 1 zone; a zone of 2.1 x 1.4 m bulged by 1.9 mm (95 % interval 1.7 to 2.1 mm)";
+    let words = "the wall changed its shape in 1 zone; a zone of 2.1 x 1.4 m bulged by 1.9 mm against the rest of the wall (95 % interval 1.7 to 2.1 mm)";
     assert!(changed.sentence.contains(words), "{}", changed.sentence);
     // Nothing of the datum is in it.
     let unknown = Case {
