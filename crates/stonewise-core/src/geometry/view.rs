@@ -5,7 +5,7 @@ use crate::id::ImageId;
 use nalgebra::{Point3, Vector3};
 
 /// A posed photo.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct View {
     /// Which photo of the epoch.
     pub image: ImageId,
