@@ -5,7 +5,7 @@ use super::*;
 use crate::geometry::Camera;
 use crate::geometry::Rigid3;
 use crate::id::ImageId;
-use nalgebra::{DVector, Matrix2x3, Matrix3, Point3, Vector3, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{DVector, Matrix2x3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 fn view(centre: [f64; 3], aim: [f64; 3], focal_px: f64) -> View {
     let (centre, aim) = (Point3::from(centre), Point3::from(aim));

@@ -108,7 +108,10 @@ mod tests {
     fn lengths_count_by_their_accuracy() {
         assert_eq!(measured([].iter()), None);
         let one = measured([distance(10.01, 10.0, 0.002)].iter()).unwrap();
-        assert!((one[0] - 1e-3).abs() < 1e-12 && (one[1] - 2e-4).abs() < 1e-12, "{one:?}");
+        assert!(
+            (one[0] - 1e-3).abs() < 1e-12 && (one[1] - 2e-4).abs() < 1e-12,
+            "{one:?}"
+        );
         // 1.0e-3 +- 2e-4 and 0.5e-3 +- 1e-4: weights of one to four.
         let two = measured([distance(10.01, 10.0, 0.002), distance(20.01, 20.0, 0.002)].iter()).unwrap();
         assert!((two[0] - 0.6e-3).abs() < 1e-12, "{two:?}");
