@@ -220,6 +220,7 @@ mod tests {
     #[test]
     fn a_later_version_is_refused() {
         let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("data")).unwrap();
         std::fs::write(
             folder.path().join(OUTLINES),
             r#"{"format":2,"origin":[0,0,0],"stones":[]}"#,

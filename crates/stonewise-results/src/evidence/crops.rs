@@ -202,7 +202,7 @@ mod tests {
         assert_eq!(back.crops, crops);
         assert_eq!((back.side_px, back.per_row, back.pictures.len()), (64, 3, 1));
         let picture =
-            stonewise_io::image_io::read_rgb(&folder.path().join("evidence/crops_1_000.jpg")).unwrap();
+            stonewise_io::image_io::read_rgb(&folder.path().join("data/evidence/crops_1_000.jpg")).unwrap();
         assert_eq!((picture.width(), picture.height()), (192, 128));
         // The fifth crop is the second of the second row.
         let middle = picture.get(96, 96).unwrap();

@@ -399,7 +399,7 @@ mod tests {
         }
         assert_eq!(back.tracks, expected);
         assert_eq!((back.side_px, back.per_row, back.pictures.len()), (32, 2, 1));
-        let atlas = folder.path().join("evidence/tracks_2_000.jpg");
+        let atlas = folder.path().join("data/evidence/tracks_2_000.jpg");
         let picture = stonewise_io::image_io::read_rgb(&atlas).unwrap();
         for (x, y, grey) in [(16, 16, 40), (48, 16, 200), (16, 48, 128)] {
             assert!(picture.get(x, y).unwrap()[0].abs_diff(grey) < 4, "{x} {y}");
