@@ -13,6 +13,7 @@ pub mod observers;
 mod octave_patches;
 pub mod photos;
 pub(crate) mod points;
+mod random;
 
 pub use adjustment::{
     AdjustError, AdjustmentParams, AdjustmentReport, Break, FaceShift, JointMotions, PhotoReport, PhotoShift,

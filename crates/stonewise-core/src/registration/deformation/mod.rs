@@ -10,7 +10,6 @@
 mod body;
 mod bulge;
 mod found;
-mod random;
 mod rigid_part;
 mod scan;
 mod shared_errors;
@@ -26,7 +25,6 @@ use crate::progress::{Interrupted, Progress};
 use body::Body;
 use found::LEVEL;
 pub use found::{Deformation, DeformationZone, StoneDeformation, ZONE_EXTENTS_M, ZoneKind};
-pub(super) use random::Random;
 use rigid_part::{RigidPart, rigid_part};
 use scan::{Scan, scan};
 use std::collections::BTreeMap;

@@ -2,7 +2,7 @@
 
 use super::body::{Body, BodyStone, Covariance, Matrix3x6};
 use super::bulge::{MostLikely, add_squares};
-use super::random::Random;
+use crate::registration::random::Random;
 use crate::statistics::{biweight, biweight_loss, congruent_scale};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;

@@ -14,10 +14,10 @@
 use super::body::{Body, BodyStone};
 use super::bulge::{Bulge, Direction, MostLikely, Score};
 use super::found::{LEVEL, OUTSIDE, ZONE_EXTENTS_M};
-use super::random::Random;
 use super::smoothed::smoothed;
 use crate::linalg::root;
 use crate::registration::bulges::{self, IN_FACE, OUT, Shape, shapes};
+use crate::registration::random::Random;
 use crate::statistics::upper_median;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, MatrixXx3, Vector3};
 use rayon::prelude::*;

@@ -1,7 +1,7 @@
 //! Errors that stones share: those of the epochs' sources, of photos' poses, and of points over longer lengths than a
 //! stone.
 
-use super::random::Random;
+use crate::registration::random::Random;
 use nalgebra::allocator::Allocator;
 use nalgebra::{DMatrix, DVector, DefaultAllocator, Dim, Dyn, Matrix3, OMatrix, U1, U3, Vector3};
 

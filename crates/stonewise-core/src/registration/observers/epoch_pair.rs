@@ -65,6 +65,8 @@ pub struct EpochPair<'a> {
     pub is_aligned: bool,
     /// The photos from which clouds were computed, where they were.
     pub network: Option<&'a PhotoNetwork>,
+    /// Whether a cloud was computed from photos that are not known: then an error of the class of such clouds is assumed.
+    pub has_unknown_photos: bool,
     /// What is known of the epochs' scale; `None`: it is exact.
     pub scale: Option<KnownScale>,
 }
@@ -82,6 +84,7 @@ impl<'a> EpochPair<'a> {
             response: None,
             is_aligned: false,
             network: None,
+            has_unknown_photos: false,
             scale: None,
         }
     }

@@ -46,7 +46,10 @@ pub(super) fn relative_errors(
         })
         .collect();
     let unknowns = Unknowns::new(&sources, &all_sights(pair, &[]), class);
-    let merged = class.merged();
+    let merged = match pair.has_unknown_photos {
+        true => MergedDrift::OF_PHOTOS,
+        false => class.merged(),
+    };
     let sd_m = params.merged_error_m.unwrap_or(merged.sd_m);
 
     let prior = Prior {

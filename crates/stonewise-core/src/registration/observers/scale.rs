@@ -4,7 +4,8 @@
 //! a wall that grew. So it is taken off as far as lengths are known, its uncertainty is an error that all stones share,
 //! and a wall that seems to grow all round by more than instruments and temperature explain leaves it open.
 
-use super::epoch_pair::EpochPair;
+use super::response::Response;
+use super::sight::SeenStone;
 use crate::geometry::Strain;
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -42,16 +43,11 @@ pub struct ScaleError {
 }
 
 impl ScaleError {
-    pub(super) fn of(known: KnownScale, pair: &EpochPair) -> Self {
-        let count = pair.stones.len().max(1) as f64;
-        let centre = Point3::from(
-            pair.stones
-                .iter()
-                .map(|s| s.centroid.coords)
-                .sum::<Vector3<f64>>()
-                / count,
-        );
-        let strain = strain(&known, pair).filter(|_| !known.is_measured);
+    /// `response`: the motions that were measured, which show the strain of the wall.
+    pub(super) fn of(known: KnownScale, stones: &[SeenStone], response: Option<&Response>) -> Self {
+        let count = stones.len().max(1) as f64;
+        let centre = Point3::from(stones.iter().map(|s| s.centroid.coords).sum::<Vector3<f64>>() / count);
+        let strain = strain(&known, response).filter(|_| !known.is_measured);
         Self {
             centre,
             mean: known.mean,
@@ -73,8 +69,8 @@ impl ScaleError {
 
 /// The strain of the stones that are not loose, if the wall grew or shrank all round by more than the scale and
 /// temperature explain.
-fn strain(known: &KnownScale, pair: &EpochPair) -> Option<[f64; 3]> {
-    let stones = pair.response?.motions.stones.iter().flatten();
+fn strain(known: &KnownScale, response: Option<&Response>) -> Option<[f64; 3]> {
+    let stones = response?.motions.stones.iter().flatten();
     let (places, displacements): (Vec<_>, Vec<_>) = stones
         .filter(|s| !s.is_loose)
         .map(|s| (s.place, s.displacement))

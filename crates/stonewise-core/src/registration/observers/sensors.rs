@@ -78,6 +78,7 @@ impl Sharpest {
             response: of.response,
             is_aligned: of.is_aligned,
             network: of.network,
+            has_unknown_photos: of.has_unknown_photos,
             scale: of.scale,
         }
     }

@@ -9,7 +9,9 @@ use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
 impl EpochErrors {
     /// Adds these errors to all covariances, and what is known of the scale to the expectations.
     pub(super) fn add_shared(&mut self, pair: &EpochPair) {
-        self.scale = pair.scale.map(|known| ScaleError::of(known, pair));
+        self.scale = pair
+            .scale
+            .map(|known| ScaleError::of(known, pair.stones, pair.response.as_ref()));
         let scale = self.scale.as_ref();
         let modes = pair.network.and_then(|network| network.modes(pair.stones));
         // By independent unknowns of variance one: a column for each.

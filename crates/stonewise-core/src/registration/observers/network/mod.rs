@@ -21,8 +21,8 @@ mod size;
 
 use super::sight::SeenStone;
 use crate::geometry::View;
-use crate::registration::deformation::Random;
 use crate::registration::modes::{less_rigid, main_modes};
+use crate::registration::random::Random;
 use bundle::{Bundle, BundleEquations};
 use nalgebra::{DMatrix, Matrix3xX};
 use rayon::prelude::*;
@@ -85,7 +85,7 @@ impl PhotoNetwork {
                 .zip(places)
                 .for_each(|(sum, place)| *sum += place * sign);
         }
-        let size = mean_square(self, stones).sqrt();
+        let size = mean_square(&self.photos, &self.shifts, stones).sqrt();
         let apart = less_rigid(stones.iter().map(|s| s.centroid), apart)?;
         Some(main_modes(&apart).into_iter().map(|by| by * size).collect())
     }

@@ -1,7 +1,7 @@
 //! How an image point depends on its place, on the pose and camera of its photo, and on the photo's field.
 
 use crate::geometry::{Camera, View};
-use crate::registration::observers::SeenStone;
+use crate::registration::observers::sight::SeenStone;
 use nalgebra::{DMatrix, Matrix2x3, Matrix2xX, Matrix3, Matrix3xX, SMatrix, Vector3};
 
 /// Standard deviation of the principal point of a photo, pixels per axis: 2.3 and 3.5 px along the rows and the columns

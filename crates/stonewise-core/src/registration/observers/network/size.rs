@@ -5,10 +5,10 @@
 //! the fields and u = F'Ry what they show, u is normal with covariance s^2 G + t^2 G G: s the factor on the noise of the
 //! matches, t that on the fields. Both epochs have places of their own, so that no motion of the wall enters.
 
-use super::PhotoNetwork;
 use super::bundle::BundleEquations;
 use super::sight::{FIELDS, Sight};
-use crate::registration::observers::SeenStone;
+use crate::geometry::View;
+use crate::registration::observers::sight::SeenStone;
 use nalgebra::{DMatrix, Matrix2, Matrix2xX, Vector2, Vector3};
 
 /// Most photos whose fields are looked at; of more, evenly chosen ones.
@@ -43,8 +43,8 @@ pub struct NetworkShift {
 }
 
 /// Expected square of the factor on the fields.
-pub(super) fn mean_square(network: &PhotoNetwork, stones: &[SeenStone]) -> f64 {
-    let information = Information::of(network, stones);
+pub(super) fn mean_square(photos: &[Vec<View>; 2], shifts: &[NetworkShift], stones: &[SeenStone]) -> f64 {
+    let information = Information::of(photos, shifts, stones);
     let logs = (-LOG_STEPS..=LOG_STEPS).map(|k| f64::from(k) * LOG_STEP);
     let deviance = |log: f64| {
         let of_data = information
@@ -72,15 +72,15 @@ struct Information {
 
 impl Information {
     /// `None` where too few stones are tracked.
-    fn of(network: &PhotoNetwork, stones: &[SeenStone]) -> Option<Self> {
-        let views: Vec<_> = network.photos.iter().flatten().collect();
+    fn of(of_epochs: &[Vec<View>; 2], shifts: &[NetworkShift], stones: &[SeenStone]) -> Option<Self> {
+        let views: Vec<_> = of_epochs.iter().flatten().collect();
         let step = views.len().div_ceil(MOST_PHOTOS).max(1);
         let photos: Vec<usize> = (0..views.len()).step_by(step).collect();
         let columns = FIELDS * photos.len() + 1;
-        let before = [0, network.photos[0].len()];
+        let before = [0, of_epochs[0].len()];
         // Of each stone in each epoch, with what each photo shows.
         let mut ties = vec![Vec::new(); 2 * stones.len()];
-        for shown in &network.shifts {
+        for shown in shifts {
             let number = before[shown.epoch] + shown.photo;
             if let Ok(place) = photos.binary_search(&number)
                 && let Some(sight) = Sight::of(number, views[number], &stones[shown.stone])

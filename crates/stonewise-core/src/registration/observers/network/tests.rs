@@ -169,7 +169,7 @@ fn matched(
 #[test]
 fn clouds_bend_as_a_dense_bundle_and_its_matches_say() {
     let (network, stones) = (network(true), stones());
-    let size = mean_square(&network, &stones).sqrt();
+    let size = mean_square(&network.photos, &network.shifts, &stones).sqrt();
     let modes: Vec<_> = network
         .modes(&stones)
         .unwrap()
@@ -266,13 +266,13 @@ fn tracked_stones_show_how_large_the_fields_are() {
             .map(|seed| {
                 let mut network = network(true);
                 network.shifts = tracked(&network, &stones, size, seed);
-                mean_square(&network, &stones).ln() / 20.0
+                mean_square(&network.photos, &network.shifts, &stones).ln() / 20.0
             })
             .sum();
         let found = (0.5 * mean).exp();
         assert!((0.75..1.3).contains(&(found / size)), "{size}: {found}");
     }
     // Without any, the class.
-    let square = mean_square(&network(true), &stones);
+    let square = mean_square(&network(true).photos, &[], &stones);
     assert!((square / (2.0 * 0.25f64).exp() - 1.0).abs() < 0.01, "{square}");
 }

@@ -1,7 +1,7 @@
 //! The error that all motions of an epoch share, as its sources and areas off the wall show it.
 
 use super::datum::is_one_survey;
-use super::network::photo_network;
+use super::network::{has_unknown_photos, photo_network};
 use super::off_wall::OffWall;
 use super::registered::{Registered, STEP};
 use super::scale::known_scale;
@@ -62,6 +62,7 @@ pub(super) fn add_epoch_error(
         }),
         is_aligned: project.is_aligned(epochs.later),
         network: network.as_ref(),
+        has_unknown_photos: has_unknown_photos(run, epochs)?,
         scale: known_scale(project, epochs, labelled, network.as_ref())?,
     };
 

@@ -52,6 +52,18 @@ pub(super) fn photo_network(
     Ok(Some(network))
 }
 
+/// Whether a cloud of these epochs was computed from photos that the project does not name.
+pub(super) fn has_unknown_photos(run: &Run, epochs: Pair<EpochId>) -> Result<bool> {
+    let project = run.context.project;
+    for id in epochs.into_array() {
+        let epoch = &project.epochs[id];
+        if epoch.photos.is_none() && epoch.found_origin()? == Some(Origin::Photos) {
+            return Ok(!is_one_survey(project, epochs));
+        }
+    }
+    Ok(false)
+}
+
 /// What photos of these epochs show of tracked stones. `before`: photos of the first epoch, which are counted first.
 fn shifts(
     network: &PhotoNetwork,

@@ -3,7 +3,7 @@
 use crate::statistics::{normal_pair, split_mix};
 
 /// A sequence of normal numbers, another for each seed.
-pub(in crate::registration) struct Random {
+pub(crate) struct Random {
     counter: u64,
     next: Option<f64>,
 }
