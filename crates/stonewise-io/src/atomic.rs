@@ -109,9 +109,11 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_folder_is_an_error() {
+    fn a_missing_folder_is_made_and_one_that_cannot_be_is_an_error() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("none").join("a.txt");
-        assert!(write_atomically(&path, |partial| fs::write(partial, "x")).is_err());
+        let path = folder.path().join("new/a.txt");
+        write_atomically(&path, |partial| fs::write(partial, "x")).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "x");
+        assert!(write_atomically(&path.join("b.txt"), |partial| fs::write(partial, "x")).is_err());
     }
 }

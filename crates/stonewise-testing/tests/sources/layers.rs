@@ -142,7 +142,7 @@ const STUDIO: Layers = &[
 
 const CLI: Layers = &[
     &["args", "counted", "gone", "note", "stdout", "steps"],
-    &["screen"],
+    &["renamed", "screen"],
     &["printer"],
     &["commands"],
 ];

@@ -102,6 +102,7 @@ mod tests {
     fn a_damaged_list_is_refused_with_its_line() {
         let dir = tempfile::tempdir().unwrap();
         assert_eq!(Digests::read(dir.path()).unwrap(), None);
+        fs::create_dir(dir.path().join("data")).unwrap();
         let good = "6437b3ac38465133ffb63b75273a8db548c558465d79db03fd359c6cd5bd9d85  a.csv\n";
         for bad in [
             "6437  b.csv",
