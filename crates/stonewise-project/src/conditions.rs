@@ -122,7 +122,7 @@ mod tests {
         for text in [
             "Datum;Pegel_m\n09.04.2024;312,40\n",
             "DATE,Pegel_m\n2024-04-09,312.4\n",
-            "Pegel_m;fecha\n312,4;9.4.2024\n",
+            "Pegel_m;fecha\n312,4;09.04.2024\n",
         ] {
             let file = read(text).unwrap();
             assert_eq!(
