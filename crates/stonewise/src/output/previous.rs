@@ -79,10 +79,12 @@ pub(super) fn set_aside(folder: &Path, project: &Project) -> Result<()> {
 /// digests. They stay aside, too, where the file system has links.
 pub(super) fn bring_back(folder: &Path, file: &Path) -> Result<()> {
     let (from, to) = (folder.join(PREVIOUS_DIR).join(file), folder.join(file));
-    match is_there(&from)? && !is_there(&to)? {
-        true => fs::hard_link(&from, &to).or_else(|_| move_file(&from, &to)),
-        false => Ok(()),
+    if !is_there(&from)? || is_there(&to)? {
+        return Ok(());
     }
+    // The folder went when it was emptied.
+    make_parent(&to)?;
+    fs::hard_link(&from, &to).or_else(|_| move_file(&from, &to))
 }
 
 /// Says that the results, these files, are finished, once their names are on the disk. With `all`, none of an
@@ -124,9 +126,13 @@ fn remove_previous(folder: &Path) -> Result<()> {
 }
 
 fn move_file(from: &Path, to: &Path) -> Result<()> {
-    let parent = to.parent().unwrap_or(to);
-    fs::create_dir_all(parent).map_err(Error::io("making a folder", parent))?;
+    make_parent(to)?;
     fs::rename(from, to).map_err(Error::io("moving a file of an earlier run", from))
+}
+
+fn make_parent(file: &Path) -> Result<()> {
+    let parent = file.parent().unwrap_or(file);
+    fs::create_dir_all(parent).map_err(Error::io("making a folder", parent))
 }
 
 /// Result files in a folder, relative to it. Files that others put there are not among them.
