@@ -77,7 +77,7 @@ fn info_tells_what_pictures_and_masks_there_are() {
     assert_eq!((code, log.as_str()), (0, ""));
     for expected in [
         "  1 photo of 64 x 48 px\n",
-        "  not usable: cannot read the image",
+        ": cannot read the image",
         "  1 label image of 64 x 48 px\n",
         "  photo, 64 x 48 px\n",
         "  label image, 64 x 48 px, 2 instances\n",

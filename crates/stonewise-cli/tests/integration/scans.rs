@@ -28,7 +28,7 @@ fn two_scans_alone_are_run_and_scored_against_the_truth() {
     let epoch = &record["epochs"][0];
     assert!(epoch["cameras"].is_null() && epoch["images"].is_null(), "{epoch}");
     assert!(
-        epoch["photos"].as_u64() >= Some(5) && epoch["stones"].as_u64() > Some(5),
+        epoch["photo_count"].as_u64() >= Some(5) && epoch["stones"].as_u64() > Some(5),
         "{epoch}"
     );
     let report = fs::read_to_string(results.join("report.html")).unwrap();
@@ -82,7 +82,7 @@ fn views_beside_photos_show_stones_and_track_none() {
     assert!(code == 0 || code == 3, "{code}: {log}");
 
     let record = json(&results.join("run.json"));
-    assert_eq!(record["epochs"][0]["photos"], 2);
+    assert_eq!(record["epochs"][0]["photo_count"], 2);
     let audit = fs::read_to_string(results.join("data/audit_epoch1.csv")).unwrap();
     assert!(audit.contains("view_001.png"), "{audit}");
     let stones = rows(&results.join("stones.csv"));

@@ -259,7 +259,7 @@ fn bad_inputs_are_named_and_nothing_half_written_stays() {
                 fs::copy(lie, first).unwrap();
             },
             3,
-            "the photo cannot be shown in the report: cannot read the image",
+            "IMG_1001.jpg: cannot read the image",
         ),
         (
             "points strewn over 2,000 km",
