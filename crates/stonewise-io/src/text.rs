@@ -81,7 +81,7 @@ fn encoding(bytes: &[u8]) -> &'static Encoding {
 /// The encoding that an XML declaration names, which is in ASCII here.
 fn declared(bytes: &[u8]) -> Option<&'static Encoding> {
     let head = bytes.strip_prefix(b"<?xml")?;
-    let head = str::from_utf8(&head[..head.len().min(DECLARATION)]).ok()?;
+    let head = String::from_utf8_lossy(&head[..head.len().min(DECLARATION)]);
     let (declaration, _) = head.split_once("?>")?;
     let (_, value) = declaration.split_once("encoding")?;
     let value = value.trim_start().strip_prefix('=')?.trim_start();

@@ -1,7 +1,7 @@
 //! Known lengths, each an observation of the scale of an epoch.
 
-use crate::Epoch;
 use crate::instruments::InstrumentFile;
+use crate::project_type::{Distance, Epoch};
 use nalgebra::Point3;
 use schemars::JsonSchema;
 use serde::de::Error as _;
@@ -14,33 +14,6 @@ use stonewise_io::table::{CsvError, CsvFile, CsvRow};
 
 /// A length of the cloud that differs from the known one by more than this share has the wrong ends or unit.
 const LARGEST_SHARE: f64 = 0.2;
-
-/// A known length.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Distance {
-    /// The epoch whose cloud shows it.
-    pub epoch: EpochId,
-    /// Its ends in the frame of that cloud, metres.
-    pub ends: [Point3<f64>; 2],
-    /// Its length, metres.
-    pub length_m: f64,
-    /// Standard deviation of the length, metres.
-    pub sd_m: f64,
-    /// The file that names it, and the line.
-    pub stated: (PathBuf, usize),
-}
-
-impl Distance {
-    /// An error about it.
-    pub fn error(&self, message: impl Into<String>) -> Error {
-        let (path, line) = self.stated.clone();
-        Error::Project {
-            path,
-            line,
-            message: message.into(),
-        }
-    }
-}
 
 /// The table `[[distances]]`, or `[distances]` with a file.
 #[derive(JsonSchema)]

@@ -17,11 +17,9 @@ pub mod sources;
 mod split;
 
 pub use conditions::{ConditionsAt, ConditionsFile};
-pub use distances::Distance;
 pub use init::{Initialised, Proposal, init, propose};
 pub use instruments::{AxisMotion, Instrument, InstrumentFile, ReadingGap};
-pub use origin::Origin;
-pub use project_type::{Epoch, PhotoChoice, PhotoFiles, Project};
+pub use project_type::{Distance, Epoch, Origin, PhotoChoice, PhotoFiles, Project};
 pub use scans::{ScansProject, is_scan};
 pub use schema::project_schema;
 pub use split::{Halves, SPLIT_FILES, split};

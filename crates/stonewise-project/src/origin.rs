@@ -1,8 +1,6 @@
 //! What the points of an epoch come from, and which bundle adjusted its photos.
 
-use crate::{Epoch, Project};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use crate::project_type::{Epoch, Origin, Project};
 use std::path::Path;
 use stonewise_base::error::Result;
 use stonewise_core::epoch::EpochId;
@@ -11,16 +9,6 @@ use stonewise_io::cloud::{CloudError, PointChunk, read_cloud};
 
 /// Points of a file that are looked at.
 const POINTS: usize = 100_000;
-
-/// What the points of an epoch come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Origin {
-    /// A laser scanner or lidar.
-    Scanner,
-    /// Photos, by dense matching.
-    Photos,
-}
 
 impl Epoch {
     /// What its points come from: as the project states it, else as the files show it. Scanners record how strong the

@@ -1,11 +1,10 @@
 //! How a project file is read and checked.
 
-use super::{Epoch, PhotoChoice, PhotoFiles, Project};
+use super::{Epoch, Origin, PhotoChoice, PhotoFiles, Project};
 use crate::conditions::ConditionsFile;
 use crate::distances::{RawDistances, distances, read_raw};
 use crate::edits::EditsFile;
 use crate::instruments::InstrumentFile;
-use crate::origin::Origin;
 use crate::sources::SourceRule;
 use schemars::JsonSchema;
 use serde::Deserialize;

@@ -1,16 +1,15 @@
 //! A project: which surveys, and every parameter.
 
 use crate::conditions::ConditionsFile;
-use crate::distances::Distance;
 use crate::edits::EditsFile;
 use crate::instruments::InstrumentFile;
-use crate::origin::Origin;
 use crate::sources::SourceRule;
+use nalgebra::Point3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use stonewise_base::error::Result;
+use stonewise_base::error::{Error, Result};
 use stonewise_base::messages::Said;
 use stonewise_base::part::Part;
 use stonewise_base::settings::{Align, Settings};
@@ -89,6 +88,43 @@ pub enum PhotoChoice {
     Auto,
     /// In all of them, as they are.
     All,
+}
+
+/// What the points of an epoch come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Origin {
+    /// A laser scanner or lidar.
+    Scanner,
+    /// Photos, by dense matching.
+    Photos,
+}
+
+/// A known length.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Distance {
+    /// The epoch whose cloud shows it.
+    pub epoch: EpochId,
+    /// Its ends in the frame of that cloud, metres.
+    pub ends: [Point3<f64>; 2],
+    /// Its length, metres.
+    pub length_m: f64,
+    /// Standard deviation of the length, metres.
+    pub sd_m: f64,
+    /// The file that names it, and the line.
+    pub stated: (PathBuf, usize),
+}
+
+impl Distance {
+    /// An error about it.
+    pub fn error(&self, message: impl Into<String>) -> Error {
+        let (path, line) = self.stated.clone();
+        Error::Project {
+            path,
+            line,
+            message: message.into(),
+        }
+    }
 }
 
 /// Photos with their cameras.

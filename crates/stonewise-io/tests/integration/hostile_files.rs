@@ -132,7 +132,7 @@ fn pictures_that_lie_about_their_sizes_are_refused_at_once() {
     let path = testdata("hostile/claim.png");
     assert_eq!(
         refusal(&path, read_label_png),
-        "the header claims 60000x60000 pixels, but the file has only 69 bytes: write the label image again: FILE"
+        "FILE: the header claims 60000x60000 pixels, but the file has only 69 bytes: write the label image again"
     );
     let folder = tempfile::tempdir().unwrap();
     fs::copy(&path, folder.path().join("photo.png")).unwrap();

@@ -119,53 +119,53 @@ fn damaged_projects_are_refused_with_file_and_place() {
             "dam.opf",
             "\"camera_list.json\"",
             "\"list.json\"",
-            "the project names list.json, which is not there: copy all files of the project, at item camera_list: FOLDER/dam.opf",
+            "FOLDER/dam.opf: the project names list.json, which is not there: copy all files of the project, at item camera_list",
         ),
         (
             "dam.opf",
             "\"camera_list.json\"",
             "\"https://example.org/list.json\"",
-            "https://example.org/list.json does not lie beside the project: export it with all its files, at item \
-             camera_list: FOLDER/dam.opf",
+            "FOLDER/dam.opf: https://example.org/list.json does not lie beside the project: export it with all its files, at item \
+             camera_list",
         ),
         (
             "dam.opf",
             "\"type\": \"camera_list\"\n  }",
             "\"type\": \"ext_list\"\n  }",
-            "the project has no camera_list: calibrate the cameras and export the project again, at items: FOLDER/dam.opf",
+            "FOLDER/dam.opf: the project has no camera_list: calibrate the cameras and export the project again, at items",
         ),
         (
             "dam.opf",
             "\"version\": \"1.0\"",
             "\"version\": \"2.0\"",
-            "OPF 2.0 is not supported: export the project as OPF 1, at version: FOLDER/dam.opf",
+            "FOLDER/dam.opf: OPF 2.0 is not supported: export the project as OPF 1, at version",
         ),
         (
             "camera_list.json",
             "[",
             "",
-            "not a file of the format application/opf-camera-list+json (invalid type: map, expected a sequence at line 5 \
-             column 2), at line 5 column 2: FOLDER/camera_list.json",
+            "FOLDER/camera_list.json: not a file of the format application/opf-camera-list+json (invalid type: map, expected \
+             a sequence at line 5 column 2), at line 5 column 2",
         ),
         (
             "camera_list.json",
             "12379813733990400002",
             "7",
-            "no camera_list names its photo, at camera 12379813733990400002: FOLDER/last/calibrated_cameras.json",
+            "FOLDER/last/calibrated_cameras.json: no camera_list names its photo, at camera 12379813733990400002",
         ),
         (
             "input_cameras.json",
             "4000,\n",
             "4000.5,\n",
-            "sensor 17293822569102704641 has an impossible image size 4000.5x3000, at photo photos/DJI 0001.JPG: \
-             FOLDER/last/calibrated_cameras.json",
+            "FOLDER/last/calibrated_cameras.json: \
+             sensor 17293822569102704641 has an impossible image size 4000.5x3000, at photo photos/DJI 0001.JPG",
         ),
         (
             FRAME,
             "\"scale\": [\n   1.0",
             "\"scale\": [\n   0.3048",
-            "the axes have different units: export the project in a system with one unit for all axes, at \
-             base_to_canonical scale: FOLDER/scene_reference_frame_1.json",
+            "FOLDER/scene_reference_frame_1.json: the axes have different units: export the project in a system with one unit for all axes, at \
+             base_to_canonical scale",
         ),
     ] {
         assert_eq!(changed(file, from, to).unwrap_err(), expected);

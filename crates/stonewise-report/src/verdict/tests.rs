@@ -442,7 +442,7 @@ fn fine_needs_the_shape_too() {
     };
     assert_eq!(judge(&unknown, &none).state, State::Attention);
     let german = assess(&bulged(true), &none, Language::German).sentence;
-    let words = "eine Zone von 2,1 x 1,4 m hat sich um 1,9 mm ausgebaucht (95-%-Intervall 1,7 bis 2,1 mm)";
+    let words = "eine Zone von 2,1 x 1,4 m hat sich gegenüber der übrigen Mauer um 1,9 mm ausgebaucht (95-%-Intervall 1,7 bis 2,1 mm)";
     assert!(german.contains(words), "{german}");
 }
 

@@ -95,13 +95,13 @@ fn results_whose_project_is_gone_have_no_edits() {
 fn a_project_outside_the_opened_results_changes_only_when_told_so() {
     let dir = crate::support::survey();
     let copy = dir.path().join("copy");
-    fs::create_dir(&copy).unwrap();
+    fs::create_dir_all(copy.join("data")).unwrap();
     fs::write(
         copy.join("run.json"),
         json!({ "project": { "file": "../stonewise.toml" } }).to_string(),
     )
     .unwrap();
-    fs::write(copy.join("stones.parquet"), "").unwrap();
+    fs::write(copy.join("data/stones.parquet"), "").unwrap();
     let studio = Tested::at(dir, "copy", false);
     let state = studio.get("/api/v1/state").json();
     assert_eq!(

@@ -110,6 +110,7 @@ const PROJECT: Layers = &[
     &["dated_csv"],
     &["conditions", "edits", "init", "instruments", "sources"],
     &["project_type"],
+    &["distances", "origin"],
     &["check", "project_file", "project_parameters", "split"],
     &["scans", "schema"],
 ];
