@@ -29,9 +29,7 @@ fn assert_pixels(file: &CameraFile, expected: &Expected) {
     assert_eq!(file.views.len(), expected.len());
     for (index, view) in file.views.iter().enumerate() {
         assert_eq!(view.image, ImageId(index as u32));
-        // A group of cameras is a folder of the name.
-        let (_, own) = view.name.rsplit_once("Group 1/").unwrap_or(("", &view.name));
-        let rows = &expected[own];
+        let rows = &expected[&view.name];
         assert_eq!(rows.len(), 20);
         for [x, y, z, u, v] in rows {
             let pixel = view.project(&Point3::new(*x, *y, *z)).unwrap().pixel;
@@ -61,7 +59,7 @@ fn metashape_puts_points_where_its_formulae_do() {
     let file = read_cameras(&fixture("metashape.xml")).unwrap();
     assert_pixels(&file, &expected("metashape"));
     let names: Vec<&str> = file.views.iter().map(|v| v.name.as_str()).collect();
-    assert_eq!(names, ["DJI_0001", "DJI_0002.v2", "DJI_0003", "DJI & 4"]);
+    assert_eq!(names, ["DJI_0001", "Group 1/DJI_0002.v2", "DJI_0003", "DJI & 4"]);
     let skipped = [("unaligned", Remark::NotAligned), ("off", Remark::Disabled)];
     let skipped = skipped.map(|(name, reason)| (name.to_owned(), reason));
     assert_eq!(file.skipped, skipped);
@@ -380,36 +378,6 @@ fn the_largest_of_several_models_is_read_and_the_others_are_named() {
         let named = read_cameras(&folder.path().join(large)).unwrap();
         assert!(named.warnings.is_empty() && named.skipped.is_empty());
     }
-}
-
-#[test]
-fn the_label_of_a_group_is_a_folder_of_the_name() {
-    let text = std::fs::read_to_string(fixture("metashape.xml")).unwrap();
-    let text = text
-        .replace("<group id=\"0\" label=\"Group 1\" type=\"folder\">", "")
-        .replace("</group>", "");
-    let (begin, end) = (text.find("<camera ").unwrap(), text.rfind("</cameras>").unwrap());
-    let grouped = format!(
-        "{}<group id=\"0\" label=\"100MEDIA\" type=\"folder\">{}</group>{}",
-        &text[..begin],
-        &text[begin..end],
-        &text[end..]
-    );
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("cameras.xml");
-    std::fs::write(&path, grouped).unwrap();
-    let names = |path: &Path| -> Vec<String> {
-        read_cameras(path)
-            .unwrap()
-            .views
-            .into_iter()
-            .map(|v| v.name)
-            .collect()
-    };
-    let plain = names(&fixture("metashape.xml"));
-    let own = |name: &String| format!("100MEDIA/{}", name.trim_start_matches("Group 1/"));
-    let expected: Vec<String> = plain.iter().map(own).collect();
-    assert_eq!(names(&path), expected);
 }
 
 #[test]

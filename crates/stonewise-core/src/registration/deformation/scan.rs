@@ -219,7 +219,7 @@ impl<'a> Model<'a> {
         // the stones of a small bulge, all on the common part.
         let spread = self.body.of_points.spread(&of_shared);
         let both = spread.transpose() * &self.of_shared * &explained;
-        let shared = of_shared.transpose() * spread - &both - both.transpose()
+        let shared = of_shared.transpose() * spread - both - both.transpose()
             + explained.transpose() * &self.shared_of_common * &explained;
         std::array::from_fn(|k| {
             let left = information[(k, k)];

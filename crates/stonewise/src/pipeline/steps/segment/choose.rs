@@ -1,6 +1,6 @@
 //! Photos in which the detector looks for stones: as many as the votes need, as large as their stones need.
 
-use super::voting_photo::{posed_photos, unusable};
+use super::voting_photo::{photo_bytes, posed_photos, unusable};
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
@@ -33,7 +33,7 @@ pub static CHOOSE: Step = Step {
     about: About::Epoch,
     needs: &[Need::same(&INGEST)],
     applies: Project::chooses_photos,
-    cost: Some(|sizes, epoch| Cost::of(4, super::photo_bytes(sizes, epoch))),
+    cost: Some(|sizes, epoch| Cost::of(4, photo_bytes(sizes, epoch))),
     make: |run, epoch| run.chosen(epoch).map(drop),
     ..Step::PLAIN
 };

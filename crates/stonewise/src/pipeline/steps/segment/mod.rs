@@ -7,7 +7,7 @@ mod voting_photo;
 
 use crate::error::Result;
 use crate::files::{read_json, write_json};
-use crate::pipeline::cost::{Cost, Sizes};
+use crate::pipeline::cost::Cost;
 use crate::pipeline::graph::{About, Need, Photos, Run, Step};
 use crate::pipeline::steps::ingest::INGEST;
 use crate::pipeline::steps::views::VIEWS;
@@ -26,7 +26,7 @@ use stonewise_core::raster::LabelImage;
 use stonewise_io::masks::read_label_png;
 use stonewise_segment::Weights;
 pub use voting_photo::VotingPhoto;
-use voting_photo::{PHOTOS, STEP, label_path, posed_photos};
+use voting_photo::{PHOTOS, STEP, label_path, photo_bytes, posed_photos};
 
 /// Brings the stones of every photo of an epoch into one label image each: from masks, where the epoch has
 /// them, else from the detector.
@@ -49,14 +49,6 @@ pub static SEGMENT: Step = Step {
     make: |run, epoch| run.segmented(epoch).map(drop),
     ..Step::PLAIN
 };
-
-/// Memory of the detector for each pixel of a photo, bytes: the photo as numbers at two sizes, and a tile a
-/// thread.
-const PIXEL_BYTES: u64 = 100;
-
-fn photo_bytes(sizes: &Sizes, epoch: EpochId) -> u64 {
-    PIXEL_BYTES * sizes.pixels[epoch]
-}
 
 fn takes_relief(project: &Project, epoch: EpochId) -> bool {
     let weights = Weights::named(&project.settings.segment.model);

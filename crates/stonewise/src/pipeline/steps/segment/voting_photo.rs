@@ -1,6 +1,7 @@
 //! A photo that can vote, and how photos and cameras find each other.
 
 use crate::error::{Error, Result};
+use crate::pipeline::cost::Sizes;
 use crate::project::Epoch;
 use crate::storage::step::StepDir;
 use crate::texts::Said;
@@ -8,6 +9,7 @@ use crate::texts::notices::{CAMERA_NOT_USED, NO_CAMERA, NO_SUCH_PHOTO, PHOTO_SIZ
 use crate::warnings::Warnings;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::View;
 use stonewise_io::cameras::{Remark, find_photos};
 use stonewise_io::image_io::image_size;
@@ -17,6 +19,15 @@ use stonewise_io::masks::InstanceInfo;
 pub const STEP: &str = "segment";
 /// List of the photos that can vote, in the step's folder.
 pub const PHOTOS: &str = "photos.json";
+
+/// Memory of the detector for each pixel of a photo, bytes: the photo as numbers at two sizes, and a tile a
+/// thread.
+const PIXEL_BYTES: u64 = 100;
+
+/// Memory of the detector for the photos of an epoch, bytes.
+pub(super) fn photo_bytes(sizes: &Sizes, epoch: EpochId) -> u64 {
+    PIXEL_BYTES * sizes.pixels[epoch]
+}
 
 /// A photo that can vote.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
