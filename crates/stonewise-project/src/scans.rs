@@ -93,10 +93,7 @@ fn title(names: &[String]) -> String {
     };
     let is_common = |end: &usize| names.iter().all(|name| name.starts_with(&first[..*end]));
     let separators = first.char_indices().filter(|(_, c)| "_- .".contains(*c));
-    let common = separators
-        .map(|(at, c)| at + c.len_utf8())
-        .filter(is_common)
-        .last();
+    let common = separators.map(|(at, c)| at + c.len_utf8()).rfind(is_common);
     let (shared, first_end) = first.split_at(common.unwrap_or(0));
     let last_end = last.strip_prefix(shared).unwrap_or(last);
     let shared = shared.replace(['_', '-', '.'], " ");

@@ -387,7 +387,7 @@ fn camera_files_may_begin_with_a_mark_and_be_in_utf_16() {
         text.encode_utf16().flat_map(u16::to_le_bytes).collect()
     };
     let marked = |text: &str| format!("\u{feff}{text}").into_bytes();
-    let writers: [&dyn Fn(&str) -> Vec<u8>; 2] = [&utf_16, &marked];
+    let writers: [fn(&str) -> Vec<u8>; 2] = [utf_16, marked];
     for name in [
         "metashape.xml",
         "opensfm.json",

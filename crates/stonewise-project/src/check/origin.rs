@@ -51,7 +51,8 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Result<Vec<
         let verdict = if is_one { Verdict::Fine } else { Verdict::Note };
         found.push(Finding::new(&epoch.name, &ORIGIN, verdict, text));
         let has_length = |id: EpochId| project.distances.iter().any(|d| d.epoch == id);
-        if !is_one && !(has_length(first.0) && has_length(*id)) {
+        let is_scaled = is_one || has_length(first.0) && has_length(*id);
+        if !is_scaled {
             found.push(Finding::new(
                 &epoch.name,
                 &SCALE,
