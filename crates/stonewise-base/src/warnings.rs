@@ -34,13 +34,16 @@ pub struct Warnings(Mutex<Vec<Warning>>);
 
 impl Warning {
     fn new(step: &str, subject: impl Into<String>, message: impl Into<Said>) -> Self {
-        let message = message.into();
+        let (subject, message) = (subject.into(), message.into());
+        // Errors name their file first.
+        let prefix = format!("{subject}: ");
+        let without = |text: String| text.strip_prefix(&prefix).map(str::to_owned).unwrap_or(text);
         Self {
             step: step.into(),
-            subject: subject.into(),
             code: message.code,
-            message: message.english,
-            german: message.german,
+            message: without(message.english),
+            german: message.german.map(without),
+            subject,
             skipped_input: false,
             doubt: false,
         }

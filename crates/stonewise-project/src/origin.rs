@@ -1,11 +1,12 @@
 //! What the points of an epoch come from, and which bundle adjusted its photos.
 
 use crate::project_type::{Epoch, Origin, Project};
+use std::ops::ControlFlow;
 use std::path::Path;
 use stonewise_base::error::Result;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::Camera;
-use stonewise_io::cloud::{CloudError, PointChunk, read_cloud};
+use stonewise_io::cloud::{PointChunk, read_first};
 
 /// Points of a file that are looked at.
 const POINTS: usize = 100_000;
@@ -34,14 +35,11 @@ impl Epoch {
 /// What the first points of a file show.
 fn of_file(path: &Path) -> Result<Option<Origin>> {
     let mut found = None;
-    let read = read_cloud(path, POINTS, |chunk| {
+    read_first(path, POINTS, |chunk| {
         found = of_points(chunk);
-        Err(Stop::Enough)
-    });
-    match read {
-        Err(Stop::Failed(error)) => Err(error.into()),
-        Ok(_) | Err(Stop::Enough) => Ok(found),
-    }
+        ControlFlow::Break(())
+    })?;
+    Ok(found)
 }
 
 fn of_points(chunk: &PointChunk) -> Option<Origin> {
@@ -52,18 +50,6 @@ fn of_points(chunk: &PointChunk) -> Option<Origin> {
         () if varies(chunk.intensities.as_ref()) || varies(chunk.times_s.as_ref()) => Some(Origin::Scanner),
         () if varies(chunk.colors.as_ref()) => Some(Origin::Photos),
         () => None,
-    }
-}
-
-/// Why reading ends before the end of the file.
-enum Stop {
-    Enough,
-    Failed(CloudError),
-}
-
-impl From<CloudError> for Stop {
-    fn from(error: CloudError) -> Self {
-        Self::Failed(error)
     }
 }
 

@@ -27,7 +27,7 @@ pub struct Guard {
     once: Mutex<Option<Secret>>,
     session: Secret,
     is_view: bool,
-    /// Nothing can be changed until the page asks for it.
+    /// Nothing can be changed until a person allows it in the page.
     is_read_only: AtomicBool,
 }
 

@@ -244,8 +244,8 @@ messages! {
             "{error}: das Foto wird nicht zum Messen verwendet";
 
         PHOTO_NOT_SHOWN = "photo-not-shown":
-            "the photo cannot be shown in the report: {error}",
-            "das Foto kann im Bericht nicht gezeigt werden: {error}";
+            "{error}: the photo is not shown in the report",
+            "{error}: das Foto wird im Bericht nicht gezeigt";
 
         PHOTO_SIZE = "photo-size":
             "the photo is {width}x{height} px, its camera {camera_width}x{camera_height} px: use it at the size of its camera",

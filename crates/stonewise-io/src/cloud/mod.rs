@@ -42,6 +42,6 @@ pub use points::{
     ExtraColumn, Observed, PointSink, stream_coloured_laz, stream_points_laz, stream_scan_laz,
     write_points_laz,
 };
-pub use read::read_cloud;
+pub use read::{read_cloud, read_first};
 pub use remark::Remark;
 pub use scan::Scan;

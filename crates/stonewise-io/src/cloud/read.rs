@@ -1,5 +1,6 @@
 //! One way into every format.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use super::chunk::Visit;
@@ -39,5 +40,37 @@ pub fn read_cloud<E: From<CloudError>>(
         CloudFormat::Ptx => ptx::read(path, chunk_points, visit),
         CloudFormat::Ply => ply::read(path, chunk_points, visit),
         CloudFormat::Text => text::read(path, chunk_points, visit),
+    }
+}
+
+/// As [`read_cloud`], until `visit` breaks off; `None` where it did.
+///
+/// # Errors
+/// As [`read_cloud`].
+pub fn read_first(
+    path: &Path,
+    chunk_points: usize,
+    mut visit: impl FnMut(&PointChunk) -> ControlFlow<()>,
+) -> Result<Option<ReadSummary>, CloudError> {
+    let read = read_cloud(path, chunk_points, |chunk| match visit(chunk) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(Stop::Enough),
+    });
+    match read {
+        Ok(summary) => Ok(Some(summary)),
+        Err(Stop::Enough) => Ok(None),
+        Err(Stop::Failed(error)) => Err(error),
+    }
+}
+
+/// Why reading ends before the end of the file.
+enum Stop {
+    Enough,
+    Failed(CloudError),
+}
+
+impl From<CloudError> for Stop {
+    fn from(error: CloudError) -> Self {
+        Self::Failed(error)
     }
 }

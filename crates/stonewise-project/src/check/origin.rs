@@ -17,13 +17,14 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Result<Vec<
         if survey.is_none() {
             continue;
         }
-        let (verdict, text) = match epoch.found_origin()? {
+        let origin = epoch.found_origin()?;
+        let (verdict, text) = match origin {
             Some(Origin::Scanner) => (Verdict::Fine, &FROM_SCANNER),
             Some(Origin::Photos) => (Verdict::Fine, &FROM_PHOTOS),
             None => (Verdict::Note, &FROM_UNKNOWN),
         };
         found.push(Finding::new(&epoch.name, &ORIGIN, verdict, text.say(&[])));
-        if epoch.found_origin()? == Some(Origin::Photos) && !epoch.is_of_reference_survey() {
+        if origin == Some(Origin::Photos) && !epoch.is_of_reference_survey() {
             from_photos.push((EpochId::at(number), epoch));
         }
     }

@@ -5,11 +5,12 @@ use super::unreadable::Unreadable;
 use crate::Epoch;
 use nalgebra::Point3;
 use std::collections::HashMap;
+use std::ops::ControlFlow;
 use std::path::Path;
 use stonewise_base::error::Result;
 use stonewise_base::messages::findings::CLOUDS;
 use stonewise_core::geometry::{Bounds, cell_of};
-use stonewise_io::cloud::{CloudError, Remark, cloud_info, read_cloud};
+use stonewise_io::cloud::{Remark, cloud_info, read_first};
 use stonewise_io::crs::Units;
 
 /// Points of an epoch that are looked at, quickly and fully.
@@ -61,23 +62,22 @@ impl Sample {
             self.bounds = Some(self.bounds.map_or(bounds, |b| b.union(&bounds)));
         }
         let before = self.passed;
-        let read = read_cloud(path, CHUNK, |chunk| {
+        let whole = read_first(path, CHUNK, |chunk| {
             let last = chunk.indices.last().map_or(0, |index| index + 1);
             self.passed = self.passed.max(before + last);
             self.unused += chunk.unused;
             let taken = left.min(chunk.positions.len());
             self.points.extend_from_slice(&chunk.positions[..taken]);
             left -= taken;
-            if left == 0 { Err(Stop::Enough) } else { Ok(()) }
-        });
-        match read {
-            Ok(summary) => {
-                self.passed = before + summary.records;
-                Ok(())
+            match left {
+                0 => ControlFlow::Break(()),
+                _ => ControlFlow::Continue(()),
             }
-            Err(Stop::Enough) => Ok(()),
-            Err(Stop::Failed(error)) => Err(error.into()),
+        })?;
+        if let Some(summary) = whole {
+            self.passed = before + summary.records;
         }
+        Ok(())
     }
 }
 
@@ -96,18 +96,6 @@ pub(super) fn sample(epoch: &Epoch, depth: Depth, unreadable: &mut Unreadable) -
     }
     sample.spacing_m = spacing(&sample.points);
     Ok(is_whole.then_some(sample))
-}
-
-/// Why reading ends before the end of the file.
-enum Stop {
-    Enough,
-    Failed(CloudError),
-}
-
-impl From<CloudError> for Stop {
-    fn from(error: CloudError) -> Self {
-        Self::Failed(error)
-    }
 }
 
 /// Median distance between neighbours on a surface: the root of the area that each point of a cell has for

@@ -63,11 +63,7 @@ impl BundleEquations {
         sights: &[&Sight],
         shifts: impl Fn(&Sight) -> Matrix2xX<f64>,
     ) -> Option<Vec<Matrix2xX<f64>>> {
-        let tie: Vec<&Sight> = sights
-            .iter()
-            .copied()
-            .filter(|s| self.unknowns.contains_key(&s.photo))
-            .collect();
+        let tie = of_photos(sights, &self.unknowns);
         let inverse = intersection(&tie)?;
         let of_place = inverse * shift(&tie, &shifts);
         let rest: Vec<Matrix2xX<f64>> = tie.iter().map(|s| shifts(s) - s.by_place * &of_place).collect();
@@ -135,6 +131,12 @@ impl BundleEquations {
     }
 }
 
+/// The sights in photos of which a bundle has the unknowns.
+fn of_photos<'a>(sights: &[&'a Sight], unknowns: &BTreeMap<usize, [usize; 2]>) -> Vec<&'a Sight> {
+    let known = sights.iter().copied();
+    known.filter(|s| unknowns.contains_key(&s.photo)).collect()
+}
+
 impl Bundle {
     /// Displacement of a place that these photos of one epoch see, whose image points shift; `None` where their rays do
     /// not intersect well or the bundle does not hold them.
@@ -143,11 +145,7 @@ impl Bundle {
         sights: &[&Sight],
         shifts: impl Fn(&Sight) -> Matrix2xX<f64>,
     ) -> Option<Matrix3xX<f64>> {
-        let known: Vec<&Sight> = sights
-            .iter()
-            .copied()
-            .filter(|s| self.unknowns.contains_key(&s.photo))
-            .collect();
+        let known = of_photos(sights, &self.unknowns);
         let inverse = intersection(&known)?;
         let apart = |s: &Sight| {
             let [pose, camera] = self.unknowns[&s.photo];

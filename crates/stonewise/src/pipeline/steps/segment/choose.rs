@@ -26,7 +26,7 @@ use stonewise_io::image_io::read_rgb;
 use stonewise_segment::tiling::segment_photo;
 use stonewise_segment::{StoneFinder, Weights};
 
-/// Chooses among the photos of an epoch without masks, unless it wants all.
+/// Chooses among the photos of an epoch without masks, unless all of them are to be used.
 pub static CHOOSE: Step = Step {
     name: STEP,
     words: |_| "photos chosen of",
