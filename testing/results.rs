@@ -97,7 +97,6 @@ pub fn registration_record() -> RegistrationRecord {
             own_m: 5e-4,
             error_m: 5e-4,
             own_rad: 2e-3,
-            bending_per_m: 0.01,
             appearance_m: None,
         },
         common_motion_m: [0.001, 0.0, -0.002],

@@ -472,7 +472,7 @@ fn unconverged() -> serde_json::Value {
         "estimator": "adjustment", "converged": false, "iterations": 30, "noise_m": [0.002, 0.002], "roughness_m": null,
         "surface_cell_m": null, "correlation_factor": null, "common_motion_m": [0.0, 0.0, 0.0],
         "common_motion_covariance_m2": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]], "loose": 2, "breaks": [],
-        "variance_components": { "drift": [0.0, 0.0], "bending_per_m": 0.0, "error_m": 0.0, "own_m": 0.0, "own_rad": 0.0, "strain": [0.0, 0.0] },
+        "variance_components": { "drift": [0.0, 0.0], "error_m": 0.0, "own_m": 0.0, "own_rad": 0.0, "strain": [0.0, 0.0] },
         "photos": { "statuses": { "few_photos": 1 }, "sigma_factor": 1.0, "appearance_m": 0.0, "poses_px": [], "stones": [
             { "stone_id": 4, "status": "few_photos", "photos": [1, 3], "correlation": 0.7, "shift_m": null, "sd_m": null }
         ] }

@@ -33,9 +33,8 @@ mod lab {
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// Names of all mechanisms that can be switched off.
-    pub const SWITCHES: [&str; 29] = [
+    pub const SWITCHES: [&str; 28] = [
         "across",
-        "bending",
         "bodies",
         "correlation",
         "covered",

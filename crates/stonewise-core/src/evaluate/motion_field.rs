@@ -4,6 +4,10 @@ use nalgebra::{Point3, Unit, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Rounds of the fixed point that undoes a motion: a motion changes by a tenth of itself at most over its own
+/// length, so that each round gains a digit.
+const ROUNDS: usize = 8;
+
 /// A known displacement of every point, a function of where the point was.
 ///
 /// In files a table with `kind`: `{ kind = "translation", d = [x, y, z] }`, or `{ kind = "bulge", centre =
@@ -118,6 +122,11 @@ impl MotionField {
     /// Where a point that was at `p` is after the motion.
     pub fn apply(&self, p: &Point3<f64>) -> Point3<f64> {
         p + self.displacement_at(p)
+    }
+
+    /// Where a point was that is at `moved` after the motion.
+    pub fn undo(&self, moved: &Point3<f64>) -> Point3<f64> {
+        (0..ROUNDS).fold(*moved, |at, _| moved - self.displacement_at(&at))
     }
 
     /// No point moves further than this, metres.

@@ -5,18 +5,18 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_core::change::{M3c2Params, OutwardReference, m3c2_survey};
 use stonewise_core::cloud::{Cloud, MemoryTiles};
-use stonewise_core::evaluate::{EvaluationParams, MotionField, MotionScore, MovedTiles, score_change};
+use stonewise_core::evaluate::{EvaluationParams, MotionField, MotionScore, score_change};
 use stonewise_core::progress::Silent;
 
 /// The face of the section leans back 1:0.2.
 const FACE: Vector3<f64> = Vector3::new(1.0, 0.0, 0.2);
 
-fn tiles(path: &Path) -> MemoryTiles {
+fn tiles(path: &Path, moved: impl Fn(Point3<f64>) -> Point3<f64>) -> MemoryTiles {
     let points = las::Reader::from_path(path).unwrap().read_all().unwrap();
     let mut tiles = BTreeMap::<[i64; 3], Vec<Point3<f64>>>::new();
     for ((x, y), z) in points.x().zip(points.y()).zip(points.z()) {
         let key = [x, y, z].map(|c| (c / 2.0).floor() as i64);
-        tiles.entry(key).or_default().push(Point3::new(x, y, z));
+        tiles.entry(key).or_default().push(moved(Point3::new(x, y, z)));
     }
     MemoryTiles::new(tiles.into_iter().map(|(key, points)| {
         let corner = key.map(|c| 2.0 * c as f64);
@@ -26,8 +26,9 @@ fn tiles(path: &Path) -> MemoryTiles {
 
 /// M3C2 on the wall itself, without ground, shrubs and the section's ends, scored in the wall's frame.
 fn score(folder: &Path, motion: &MotionField) -> MotionScore {
-    let [first, second] = [1, 2].map(|e| tiles(&folder.join(format!("epoch{e}/cloud_tls.laz"))));
-    let moved = MovedTiles::new(&second, motion);
+    let file = |epoch| folder.join(format!("epoch{epoch}/cloud_tls.laz"));
+    let first = tiles(&file(1), |p| p);
+    let moved = tiles(&file(2), |p| motion.apply(&p));
     let outward = OutwardReference::Direction(Vector3::x());
     let params = M3c2Params::default();
     let mut field = m3c2_survey(&first, &moved, &outward, &params, &Silent).unwrap();

@@ -58,6 +58,18 @@ pub struct DiskTiles {
     cache: Mutex<VecDeque<(usize, Arc<Cloud>)>>,
 }
 
+impl Clone for DiskTiles {
+    /// The same tiles, none of them in memory yet.
+    fn clone(&self) -> Self {
+        Self {
+            dir: self.dir.clone(),
+            tiles: self.tiles.clone(),
+            frame: self.frame,
+            cache: Mutex::default(),
+        }
+    }
+}
+
 impl DiskTiles {
     /// Opens the tiles that [`cut_into_tiles`] wrote.
     pub fn open(dir: &Path) -> Result<Self> {
@@ -73,10 +85,8 @@ impl DiskTiles {
     /// These tiles with every point moved by `frame`; their order, names and provenance stay.
     pub fn in_frame(&self, frame: &Rigid3) -> Self {
         Self {
-            dir: self.dir.clone(),
-            tiles: self.tiles.clone(),
             frame: Some(*frame),
-            cache: Mutex::default(),
+            ..self.clone()
         }
     }
 

@@ -63,9 +63,9 @@ fn is_broken(adjustment: &Adjustment, edge: &Edge, tie: &Tie, jump: &Vector3<f64
 #[cfg(test)]
 mod tests {
     use super::super::field::Crack;
-    use super::super::stone_vector::Vector9;
     use super::super::testing::{COLUMNS, begun, wall};
     use super::*;
+    use crate::registration::adjustment::field::Vector9;
     use crate::registration::points::MemoryPairs;
 
     /// Motion of the stones right of the middle against the others.

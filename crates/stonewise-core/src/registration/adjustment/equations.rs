@@ -121,9 +121,9 @@ impl Adjustment {
     }
 
     /// Variances of errors that all points of a stone share, beyond what its own cells show: translation,
-    /// rotation, bending. `octaves` of length, from the size of a stone up: one against its neighbours,
+    /// rotation. `octaves` of length, from the size of a stone up: one against its neighbours,
     /// [`Self::octaves`] against another epoch.
-    pub fn shared_variances(&self, octaves: f64) -> [f64; 9] {
+    pub fn shared_variances(&self, octaves: f64) -> [f64; 6] {
         let stones = self.stones.iter();
         let known: Vec<&Equations> = stones.filter_map(|s| s.with_field.surface.equations()).collect();
         self.surface

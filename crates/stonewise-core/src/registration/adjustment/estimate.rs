@@ -5,9 +5,9 @@ use super::field::{Prediction, covariance_against, posterior};
 use super::observation::NormalEquations;
 use super::solution::Solution;
 use super::state::{Adjustment, Evidence, StoneState};
-use super::stone_vector::{Matrix9, StoneVector, Vector9};
+use super::stone_vector::StoneVector;
 use crate::switches::{is_on, switchable};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Share of the results that intervals of 1.96 standard deviations leave outside.
@@ -23,13 +23,13 @@ const CONTRADICTED: f64 = 0.3;
 pub(crate) struct Estimate {
     /// About the common motion.
     pub mean: StoneVector,
-    pub covariance: Matrix9,
+    pub covariance: Matrix6<f64>,
     /// Covariance of the translation against what the neighbours predict, m^2.
     pub relative_covariance: Matrix3<f64>,
     /// Probability that the stone is loose, if `covariance` is widened for it ([`widening`]); else 0.
     pub missed: f64,
     /// Derivative of the motion with respect to the motion of the field at the stone.
-    pub by_field: Matrix9,
+    pub by_field: Matrix6<f64>,
 }
 
 /// What holds of a stone if it moved in one of the ways that are possible.
@@ -38,9 +38,9 @@ struct Case {
     /// Logarithm of the density of the stone's observations in this case.
     log_evidence: f64,
     mean: StoneVector,
-    covariance: Matrix9,
+    covariance: Matrix6<f64>,
     relative_covariance: Matrix3<f64>,
-    by_field: Matrix9,
+    by_field: Matrix6<f64>,
 }
 
 impl Case {
@@ -64,7 +64,7 @@ impl Adjustment {
         &self,
         i: usize,
         solution: &Solution,
-        shared: &[f64; 9],
+        shared: &[f64; 6],
         across_m: Option<&Vector3<f64>>,
     ) -> Estimate {
         let (stone, equations) = (&self.stones[i], &solution.equations[i]);
@@ -72,7 +72,7 @@ impl Adjustment {
         // What counts as an error might be a motion after all.
         let slide_m2 = self.undetected_slide_m(i).powi(2);
 
-        let case = |prediction: &Prediction, equations: &NormalEquations, own: &[f64; 9], slide_m2: f64| {
+        let case = |prediction: &Prediction, equations: &NormalEquations, own: &[f64; 6], slide_m2: f64| {
             let found = posterior(equations, prediction, own);
             let mut covariance = found.covariance;
             let mut relative_covariance = covariance_against(&found, prediction, own, shared);
@@ -176,10 +176,10 @@ impl Estimate {
         }
         let mut sum = Self {
             mean,
-            covariance: Matrix9::zeros(),
+            covariance: Matrix6::zeros(),
             relative_covariance: Matrix3::zeros(),
             missed: 0.0,
-            by_field: Matrix9::zeros(),
+            by_field: Matrix6::zeros(),
         };
         for case in cases {
             let p = case.probability;
@@ -207,11 +207,11 @@ impl Estimate {
 /// Derivative of a stone's motion with respect to the field's motion. W are the variances of the stone's own
 /// motion, H is the information of its observations. The stone departs from the field by (H + W^-1)^-1 H
 /// times the difference that its observations show, so it follows the field with the share (I + W H)^-1.
-pub(crate) fn by_field(equations: &NormalEquations, own: &[f64; 9]) -> Matrix9 {
-    let own = Matrix9::from_diagonal(&Vector9::from(*own));
-    (Matrix9::identity() + own * equations.information)
+pub(crate) fn by_field(equations: &NormalEquations, own: &[f64; 6]) -> Matrix6<f64> {
+    let own = Matrix6::from_diagonal(&Vector6::from(*own));
+    (Matrix6::identity() + own * equations.information)
         .try_inverse()
-        .unwrap_or_else(Matrix9::identity)
+        .unwrap_or_else(Matrix6::identity)
 }
 
 /// Factor on the covariance of a stone that moves with its neighbours, for the small probability `p_loose`
@@ -259,8 +259,8 @@ mod tests {
         let of_stone = |i: usize| {
             let moved = motion(i) - adjustment.prior.common_in(i).translation();
             let weight = SD_M.powi(-2);
-            let weights = Vector9::from([weight, weight, weight, 1e4, 1e4, 1e4, 1e2, 1e2, 1e2]);
-            let information = Matrix9::from_diagonal(&weights);
+            let weights = Vector6::from([weight, weight, weight, 1e4, 1e4, 1e4]);
+            let information = Matrix6::from_diagonal(&weights);
             let with_field = NormalEquations {
                 vector: information * StoneVector::from_translation(moved).unknowns(),
                 information,

@@ -7,10 +7,9 @@ use super::joint_motions::{JointMotions, JointStone, Pull};
 use super::octaves::Octaves;
 use super::solution::Solution;
 use super::state::{Adjustment, Evidence};
-use super::stone_vector::Vector9;
 use crate::linalg::{root, without_negative};
 use crate::stone::{MotionFailure, PairResult};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector6};
 use rayon::prelude::*;
 
 /// The joint distribution as the last solution has it.
@@ -51,7 +50,7 @@ pub(super) fn joint_motions(
         let by_poses = photos.iter().flat_map(|p| p.by_poses());
         let by_poses = by_poses.map(|(unknown, by)| (unknown, world * by)).collect();
         let common = adjustment.prior.common_in(i);
-        let own_motion = Vector9::from(adjustment.prior.own_variances());
+        let own_motion = Vector6::from(adjustment.prior.own_variances());
         let noise = octave + Matrix3::from_diagonal(&own_motion.fixed_rows::<3>(0));
         let observed = solution.equations[i].with_field.of_displacement(&noise);
         let vector = observed.1 + observed.0 * common.translation();

@@ -1,11 +1,10 @@
 //! Covariances of the motions of neighbours relative to each other.
 
 use super::estimate::{Estimate, widening};
-use super::field::{Edge, stone_from_field};
+use super::field::{Edge, Matrix9, stone_from_field};
 use super::octaves::Octaves;
 use super::solution::Solution;
 use super::state::Adjustment;
-use super::stone_vector::Matrix9;
 use super::tracking::PhotoPart;
 use crate::linalg::without_negative;
 use crate::statistics::{UPPER_95, student_95};
@@ -141,8 +140,8 @@ mod tests {
     use super::*;
     use crate::registration::adjustment::estimate::by_field;
     use crate::registration::adjustment::observation::NormalEquations;
-    use crate::registration::adjustment::stone_vector::{StoneVector, Vector9};
-    use nalgebra::Rotation3;
+    use crate::registration::adjustment::stone_vector::StoneVector;
+    use nalgebra::{Matrix6, Rotation3, Vector6};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -155,37 +154,37 @@ mod tests {
             (&m * m.transpose() + DMatrix::identity(size, size)) * scale
         };
         let prior = spd(18, 1e5);
-        let observed: [Matrix9; 2] = [0, 1].map(|_| Matrix9::from_column_slice(spd(9, 1e6).as_slice()));
-        let own: [f64; 9] = std::array::from_fn(|k| 1e-7 * (k + 1) as f64);
+        let observed: [Matrix6<f64>; 2] = [0, 1].map(|_| Matrix6::from_column_slice(spd(6, 1e6).as_slice()));
+        let own: [f64; 6] = std::array::from_fn(|k| 1e-7 * (k + 1) as f64);
         let frames = [[0.3, -0.2, 0.9], [-0.4, 0.1, 0.2]]
             .map(|[r, p, y]| Rotation3::from_euler_angles(r, p, y).into_inner());
         let fields = frames.map(|frame| stone_from_field(&frame));
         // Unknowns: both fields, both own motions.
-        let mut normal = DMatrix::<f64>::zeros(36, 36);
+        let mut normal = DMatrix::<f64>::zeros(30, 30);
         normal.view_mut((0, 0), (18, 18)).copy_from(&prior);
         let motions = [0, 1].map(|i| {
-            let mut motion = DMatrix::<f64>::zeros(9, 36);
-            motion.view_mut((0, 9 * i), (9, 9)).copy_from(&fields[i]);
-            motion.view_mut((0, 18 + 9 * i), (9, 9)).fill_with_identity();
+            let mut motion = DMatrix::<f64>::zeros(6, 30);
+            motion.view_mut((0, 9 * i), (6, 9)).copy_from(&fields[i]);
+            motion.view_mut((0, 18 + 6 * i), (6, 6)).fill_with_identity();
             motion
         });
         for (i, motion) in motions.iter().enumerate() {
             normal += motion.transpose() * observed[i] * motion;
-            (0..9).for_each(|k| normal[(18 + 9 * i + k, 18 + 9 * i + k)] += 1.0 / own[k]);
+            (0..6).for_each(|k| normal[(18 + 6 * i + k, 18 + 6 * i + k)] += 1.0 / own[k]);
         }
         let inverse = normal.try_inverse().unwrap();
         let expected = &motions[0] * &inverse * motions[1].transpose();
         let expected = frames[0].transpose() * expected.fixed_view::<3, 3>(0, 0) * frames[1];
         let field = Matrix9::from_fn(|r, c| inverse[(r, 9 + c)]);
         let estimates = observed.map(|information| Estimate {
-            mean: StoneVector::from(Vector9::zeros()),
-            covariance: Matrix9::zeros(),
+            mean: StoneVector::from(Vector6::zeros()),
+            covariance: Matrix6::zeros(),
             relative_covariance: Matrix3::zeros(),
             missed: 0.0,
             by_field: by_field(
                 &NormalEquations {
                     information,
-                    vector: Vector9::zeros(),
+                    vector: Vector6::zeros(),
                     constant: 0.0,
                 },
                 &own,

@@ -15,7 +15,6 @@ use super::params::{AdjustmentReport, Break};
 use super::significance::{Tested, test_stones};
 use super::solution::Solution;
 use super::state::Adjustment;
-use super::stone_vector::Matrix9;
 use crate::geometry::Rigid3;
 use crate::stone::{MotionFailure, NeighbourCovariance, PairResult, StoneMotion};
 use crate::switches::is_on;
@@ -36,8 +35,7 @@ const BAD_SHARE_LOOSE: f64 = 0.2;
 const ROOM_M: f64 = 0.04;
 /// Sum of 4^-k: what all octaves of length together leave in the mean over the wall, in variances of one.
 const OCTAVES_IN_MEAN: f64 = 4.0 / 3.0;
-/// Information that keeps rotations and bendings solvable which no point determines; far below any that
-/// counts.
+/// Information that keeps rotations solvable which no point determines; far below any that counts.
 const RIDGE: f64 = 1e-9;
 
 /// What the last iteration says of the stones; nothing where there was none.
@@ -115,7 +113,7 @@ impl Found {
 /// the mean.
 ///
 /// `shared`: variances of errors that all points of a stone share, over one octave.
-fn common_covariance(adjustment: &Adjustment, solution: &Solution, shared: &[f64; 9]) -> Matrix3<f64> {
+fn common_covariance(adjustment: &Adjustment, solution: &Solution, shared: &[f64; 6]) -> Matrix3<f64> {
     let own = adjustment.prior.own_variances();
     let octave = shared[0];
     let of_stone = (0..3).map(|k| own[k] + shared[k] - octave).fold(0.0, f64::max);
@@ -128,7 +126,7 @@ fn common_covariance(adjustment: &Adjustment, solution: &Solution, shared: &[f64
 fn estimates(
     adjustment: &Adjustment,
     solution: &Solution,
-    shared: &[f64; 9],
+    shared: &[f64; 6],
     covered: &[bool],
 ) -> Vec<Result<Estimate, MotionFailure>> {
     let across = adjustment.moved_across(solution);
@@ -243,7 +241,7 @@ fn motion(
     solution: &Solution,
     tested: Tested,
     estimate: &Estimate,
-    (shared, octaves, poses): (&[f64; 9], &Octaves, &DMatrix<f64>),
+    (shared, octaves, poses): (&[f64; 6], &Octaves, &DMatrix<f64>),
 ) -> StoneMotion {
     let node = &adjustment.prior.graph.nodes[i];
     let world = node.face_from_world.transpose();
@@ -285,22 +283,20 @@ fn motion(
 }
 
 /// Covariance of (displacement, rotation) in world axes from that of a stone's unknowns.
-fn in_world(local: &Matrix9, world: &Matrix3<f64>) -> Matrix6<f64> {
-    let mut covariance = Matrix6::zeros();
-    for (r, c) in [(0, 0), (0, 3), (3, 0), (3, 3)] {
-        let block = world * local.fixed_view::<3, 3>(r, c) * world.transpose();
-        covariance.fixed_view_mut::<3, 3>(r, c).copy_from(&block);
-    }
-    covariance
+fn in_world(local: &Matrix6<f64>, world: &Matrix3<f64>) -> Matrix6<f64> {
+    let mut both = Matrix6::zeros();
+    both.fixed_view_mut::<3, 3>(0, 0).copy_from(world);
+    both.fixed_view_mut::<3, 3>(3, 3).copy_from(world);
+    both * local * both.transpose()
 }
 
-/// Square root of the smallest over the largest eigenvalue of the displacement's information, rotation and
-/// bending free.
+/// Square root of the smallest over the largest eigenvalue of the displacement's information, the rotation
+/// free.
 fn observability(equations: &NormalEquations) -> f64 {
     let h = &equations.information;
-    let rest = h.fixed_view::<6, 6>(3, 3).into_owned() + Matrix6::identity() * RIDGE;
+    let rest = h.fixed_view::<3, 3>(3, 3).into_owned() + Matrix3::identity() * RIDGE;
     let Some(factor) = rest.cholesky() else { return 0.0 };
-    let cross = h.fixed_view::<6, 3>(3, 0).into_owned();
+    let cross = h.fixed_view::<3, 3>(3, 0).into_owned();
     let own = h.fixed_view::<3, 3>(0, 0) - cross.transpose() * factor.solve(&cross);
     let values = own.symmetric_eigenvalues();
     if values.max() > 0.0 {
@@ -314,16 +310,15 @@ fn observability(equations: &NormalEquations) -> f64 {
 mod tests {
     use super::*;
     use crate::registration::adjustment::observation::surface::without_points;
-    use crate::registration::adjustment::stone_vector::Vector9;
-    use nalgebra::Rotation3;
+    use nalgebra::{Rotation3, Vector6};
 
     #[test]
     fn observability_is_that_of_the_inverse_covariance_of_the_displacement() {
-        let m = Matrix9::from_fn(|r, c| ((r * 5 + c * 11) % 7) as f64 - 3.0);
-        let information = m * m.transpose() + Matrix9::identity();
+        let m = Matrix6::from_fn(|r, c| ((r * 5 + c * 11) % 7) as f64 - 3.0);
+        let information = m * m.transpose() + Matrix6::identity();
         let equations = NormalEquations {
             information,
-            vector: Vector9::zeros(),
+            vector: Vector6::zeros(),
             constant: 0.0,
         };
         let covariance = information
@@ -351,15 +346,15 @@ mod tests {
     }
 
     #[test]
-    fn covariances_turn_with_their_axes_and_bending_drops_out() {
+    fn covariances_turn_with_their_axes() {
         let turn = Rotation3::from_euler_angles(0.3, -0.2, 0.9).into_inner();
-        let m = Matrix9::from_fn(|r, c| ((r * 3 + c * 7) % 5) as f64);
+        let m = Matrix6::from_fn(|r, c| ((r * 3 + c * 7) % 5) as f64);
         let local = m * m.transpose();
-        let mut lever = nalgebra::SMatrix::<f64, 6, 9>::zeros();
-        lever.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
-        lever.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
-        let expected = lever * local * lever.transpose();
-        assert!((in_world(&local, &turn) - expected).norm() < 1e-9 * expected.norm());
+        let found = in_world(&local, &turn);
+        for (r, c) in [(0, 0), (0, 3), (3, 0), (3, 3)] {
+            let expected = turn * local.fixed_view::<3, 3>(r, c) * turn.transpose();
+            assert!((found.fixed_view::<3, 3>(r, c) - expected).norm() < 1e-9 * expected.norm());
+        }
     }
 
     #[test]

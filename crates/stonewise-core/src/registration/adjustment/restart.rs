@@ -9,14 +9,14 @@ use super::error::AdjustError;
 use super::hypothesis::{LikelihoodRatioTest, Placed};
 use super::observation::surface::{LocalPair, PointWeights};
 use super::state::Adjustment;
-use super::stone_vector::{Matrix9, StoneVector};
+use super::stone_vector::StoneVector;
 use super::survey::Points;
 use crate::cloud::GridIndex;
 use crate::geometry::Bounds;
 use crate::registration::points::{PairPoints, PairSource};
 use crate::statistics::component_median;
 use crate::switches::switchable;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix6, Point3, Vector3};
 use rayon::prelude::*;
 
 /// Nearest stones, whether ties join them or not, that show how the surroundings moved: twice those that a
@@ -137,7 +137,7 @@ impl Adjustment {
         let mut at = start;
         for _ in 0..STEPS {
             let e = self.surface.equations(local, &at, &at, &PointWeights::NONE);
-            let held = e.information + Matrix9::identity() * inflation / self.params.loose_move_m.powi(2);
+            let held = e.information + Matrix6::identity() * inflation / self.params.loose_move_m.powi(2);
             let step = StoneVector::from(held.cholesky()?.solve(&e.gradient));
             let length = step.translation().norm();
             at = at - step.scaled((self.params.max_step_m / length).min(1.0));

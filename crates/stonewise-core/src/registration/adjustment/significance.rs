@@ -4,13 +4,7 @@ use super::field::{Prediction, posterior};
 use super::observation::NormalEquations;
 use super::solution::Solution;
 use super::state::{Adjustment, Evidence};
-use super::stone_vector::{Matrix9, Vector9};
 use crate::statistics::chi_square_p;
-use nalgebra::{Matrix3, SMatrix};
-
-/// Share of the largest information on bending below which a direction of it counts as not observed: the
-/// rounding of double precision.
-const UNOBSERVED: f64 = 1e-12;
 
 /// A stone tested against its neighbours.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,34 +58,9 @@ fn p_values(adjustment: &Adjustment, solution: &Solution) -> Vec<Option<f64>> {
 }
 
 /// P-value of one stone with these variances of its own motion.
-///
-/// Bending is free: a bent face is not a loose stone.
-fn p_value(equations: &NormalEquations, prediction: &Prediction, own: &[f64; 9]) -> Option<f64> {
-    let (misfit, freedom) = posterior(&with_free_bending(equations), prediction, own).misfit;
+fn p_value(equations: &NormalEquations, prediction: &Prediction, own: &[f64; 6]) -> Option<f64> {
+    let (misfit, freedom) = posterior(equations, prediction, own).misfit;
     (freedom > 0).then(|| chi_square_p(misfit, freedom))
-}
-
-/// Equations of translation and rotation with any bending eliminated; the constant is not carried along.
-fn with_free_bending(equations: &NormalEquations) -> NormalEquations {
-    let h = &equations.information;
-    let bending = h.fixed_view::<3, 3>(6, 6).into_owned();
-    let cross: SMatrix<f64, 6, 3> = h.fixed_view::<6, 3>(0, 6).into_owned();
-    let inverse = bending
-        .pseudo_inverse(UNOBSERVED * bending.trace())
-        .unwrap_or_else(|_| Matrix3::zeros());
-    let share = cross * inverse;
-    let mut information = Matrix9::zeros();
-    information
-        .fixed_view_mut::<6, 6>(0, 0)
-        .copy_from(&(h.fixed_view::<6, 6>(0, 0) - share * cross.transpose()));
-    let mut vector = Vector9::zeros();
-    let reduced = equations.vector.fixed_rows::<6>(0) - share * equations.vector.fixed_rows::<3>(6);
-    vector.fixed_rows_mut::<6>(0).copy_from(&reduced);
-    NormalEquations {
-        information,
-        vector,
-        constant: 0.0,
-    }
 }
 
 /// Selects as many stones, in the order of their probability of an error, as keep the mean of that probability within
@@ -122,14 +91,13 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    /// P-values of stones whose observations follow the model, and whose faces bend by `bending` in any
-    /// direction.
-    fn simulated(bending_per_m: f64) -> Vec<f64> {
+    /// P-values of stones whose observations follow the model.
+    fn simulated() -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(8);
         let mut normal = || stonewise_testing::normal(&mut rng);
-        let own: [f64; 9] = [1e-8, 1e-8, 4e-8, 1e-6, 1e-6, 1e-6, 1e-4, 1e-4, 1e-4];
-        let mut root = Matrix9::from_fn(|_, _| normal());
-        let sd = [4e-4, 4e-4, 2e-4, 4e-3, 4e-3, 8e-3, 0.05, 0.05, 0.05];
+        let own: [f64; 6] = [1e-8, 1e-8, 4e-8, 1e-6, 1e-6, 1e-6];
+        let mut root = Matrix6::from_fn(|_, _| normal());
+        let sd = [4e-4, 4e-4, 2e-4, 4e-3, 4e-3, 8e-3];
         for (r, sd) in sd.iter().enumerate() {
             let mut row = root.row_mut(r);
             row *= 0.5 * sd;
@@ -138,12 +106,9 @@ mod tests {
         let information = (root * root.transpose()).try_inverse().unwrap();
         (0..4000)
             .map(|_| {
-                let mut motion = root * Vector9::from_fn(|_, _| normal());
+                let mut motion = root * Vector6::from_fn(|_, _| normal());
                 for k in 0..6 {
                     motion[k] += normal() * (own[k] + of_prediction[(k, k)]).sqrt();
-                }
-                for k in 6..9 {
-                    motion[k] += normal() * bending_per_m;
                 }
                 let equations = NormalEquations {
                     information,
@@ -161,16 +126,11 @@ mod tests {
 
     #[test]
     fn p_values_of_stones_that_follow_the_model_are_uniform() {
-        for bending_per_m in [0.0, 10.0] {
-            let p = simulated(bending_per_m);
-            for level in [0.05, 0.3, 0.5, 0.9] {
-                let share = p.iter().filter(|&&p| p < level).count() as f64 / p.len() as f64;
-                let sampling = (level * (1.0 - level) / p.len() as f64).sqrt();
-                assert!(
-                    (share - level).abs() < 4.0 * sampling,
-                    "{bending_per_m} {level}: {share}"
-                );
-            }
+        let p = simulated();
+        for level in [0.05, 0.3, 0.5, 0.9] {
+            let share = p.iter().filter(|&&p| p < level).count() as f64 / p.len() as f64;
+            let sampling = (level * (1.0 - level) / p.len() as f64).sqrt();
+            assert!((share - level).abs() < 4.0 * sampling, "{level}: {share}");
         }
     }
 

@@ -9,50 +9,44 @@ use super::observation::photo::{
 };
 use super::solution::Solution;
 use super::state::{Adjustment, StoneState};
-use super::stone_vector::{Matrix9, StoneVector};
+use super::stone_vector::StoneVector;
 use super::survey::Points;
 use crate::registration::photos::{FaceMotion, PhotoSource, PhotoStatus, Track, Tracker};
 use crate::registration::points::{PairPoints, PairSource};
 use crate::stone::PairResult;
 use crate::switches::switchable;
-use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
 use rayon::prelude::*;
 
-/// Rotation and bending of a stone before its points are looked at, radians and 1/m: ten times what loose
-/// stones do.
-const OPEN: [f64; 2] = [0.2, 1.0];
+/// Rotation of a stone before its points are looked at, radians: ten times what loose stones do.
+const OPEN_RAD: f64 = 0.2;
 /// Standard deviations of the clouds' place within which a stone is sought.
 const SEARCH_SDS: f64 = 3.0;
 
-/// What is known of a stone's rotation and bending before its points are looked at: information, and information times
-/// them, about the common motion.
+/// What is known of a stone's rotation before its points are looked at: information, and information times it, about the
+/// common motion.
 struct Turn {
-    information: Matrix6<f64>,
-    vector: Vector6<f64>,
+    information: Matrix3<f64>,
+    vector: Vector3<f64>,
 }
 
 impl Turn {
     /// Next to nothing.
     fn open() -> Self {
-        let [turn, bend] = OPEN.map(|sd| sd.powi(-2));
         Self {
-            information: Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, bend, bend, bend)),
-            vector: Vector6::zeros(),
+            information: Matrix3::identity() * OPEN_RAD.powi(-2),
+            vector: Vector3::zeros(),
         }
     }
 
     /// What the other stones predict of a stone that moves with them.
-    fn predicted(prediction: &Prediction, own: &[f64; 9]) -> Option<Self> {
-        let mut covariance = Matrix6::from_diagonal(&Vector6::from_fn(|k, _| own[3 + k]));
-        let mut rotation = covariance.fixed_view_mut::<3, 3>(0, 0);
-        rotation += prediction.covariance.fixed_view::<3, 3>(3, 3);
+    fn predicted(prediction: &Prediction, own: &[f64; 6]) -> Option<Self> {
+        let own = Matrix3::from_diagonal(&Vector3::new(own[3], own[4], own[5]));
+        let covariance = own + prediction.covariance.fixed_view::<3, 3>(3, 3);
         let information = covariance.cholesky()?.inverse();
-        let mut mean = Vector6::zeros();
-        mean.fixed_rows_mut::<3>(0)
-            .copy_from(&prediction.mean.fixed_rows::<3>(3));
         Some(Self {
             information,
-            vector: information * mean,
+            vector: information * prediction.mean.fixed_rows::<3>(3),
         })
     }
 }
@@ -196,8 +190,8 @@ impl Adjustment {
         i: usize,
         moving: Moving,
         solution: &Solution,
-        shared: &[f64; 9],
-    ) -> (StoneVector, Matrix9) {
+        shared: &[f64; 6],
+    ) -> (StoneVector, Matrix6<f64>) {
         let stone = &self.stones[i];
         let (candidate, own) = match moving {
             Moving::WithField => (&stone.with_field, self.prior.own_variances()),
@@ -275,7 +269,7 @@ impl Adjustment {
         Some(report)
     }
 
-    /// `turn`: what is known of a stone's rotation and bending; `None`: nothing.
+    /// `turn`: what is known of a stone's rotation; `None`: nothing.
     fn stones_in_photos(
         &self,
         place: impl Fn(usize) -> [f64; 2] + Sync,
@@ -328,9 +322,9 @@ impl Adjustment {
         let shift = self.prior.loose.move_m.max(self.params.max_sd_m).powi(-2);
         let (mut information, mut vector) = (equations.information, equations.vector);
         (0..3).for_each(|k| information[(k, k)] += shift);
-        let mut rest = information.fixed_view_mut::<6, 6>(3, 3);
+        let mut rest = information.fixed_view_mut::<3, 3>(3, 3);
         rest += turn.information;
-        let mut rest = vector.fixed_rows_mut::<6>(3);
+        let mut rest = vector.fixed_rows_mut::<3>(3);
         rest += turn.vector;
         let inverse = information.cholesky()?.inverse();
         let lever = StonePhotos::lever(place);
@@ -389,6 +383,7 @@ mod tests {
     use super::super::testing::{begun, wall};
     use super::*;
     use crate::registration::points::MemoryPairs;
+    use nalgebra::Vector6;
 
     #[test]
     fn a_predicted_turn_weighs_in_a_displacement_as_in_the_posterior_of_the_whole_motion() {

@@ -257,7 +257,7 @@ struct Translation {
 }
 
 impl Translation {
-    /// A source's rotation within one stone is negligible, and so is the stone's bending.
+    /// A source's rotation within one stone is negligible.
     fn new(e: &Equations, at: &Vector3<f64>, face_from_world: &Matrix3<f64>) -> Self {
         let world = face_from_world.transpose();
         let information = world * e.information.fixed_view::<3, 3>(0, 0) * face_from_world;

@@ -6,7 +6,7 @@
 //! Epochs with masks stay as they are.
 
 use super::join::{JOIN, may_be_part};
-use super::label::{DiskLabels, Labelled, Labels, last_number, tabulate};
+use super::label::{Labelled, Labels, last_number, tabulate};
 use super::shapes::{Matches, Others, is_corrected, shapes};
 use crate::error::Result;
 use crate::files::{read_json, write_json};
@@ -14,6 +14,7 @@ use crate::pipeline::context::Context;
 use crate::pipeline::cost::Cost;
 use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::until::Until;
+use crate::storage::labels::DiskLabels;
 use crate::storage::step::Key;
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;

@@ -5,7 +5,7 @@
 //! the detector takes for the same stone in every epoch. Their surface is smooth, so that they seem to slide.
 
 use super::carry::CARRY;
-use super::label::{DiskLabels, Labelled, Labels, tabulate};
+use super::label::{Labelled, Labels, tabulate};
 use super::shapes::is_corrected;
 use super::views::has_no_photos;
 use crate::error::Result;
@@ -14,6 +14,7 @@ use crate::pipeline::cost::Cost;
 use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::until::Until;
 use crate::project::Project;
+use crate::storage::labels::DiskLabels;
 use crate::storage::step::Key;
 use std::collections::BTreeSet;
 use std::sync::Arc;

@@ -5,7 +5,7 @@ use crate::pipeline::context::Context;
 use crate::pipeline::cost::Cost;
 use crate::pipeline::graph::{About, Run, Step};
 use crate::project::Epoch;
-use crate::storage::epoch_tiles::EpochTiles;
+use crate::storage::epoch_tiles::{EpochTiles, KnownMotion};
 use crate::storage::step::{Key, StepDir};
 use crate::storage::tiles::{DiskTiles, Keeps, cut_into_tiles};
 use crate::texts::notices::{INVALID_POINTS, UNUSED_POINTS};
@@ -107,7 +107,7 @@ fn ingest(context: &Context, id: EpochId) -> Result<Ingested> {
 
     let tiles = EpochTiles {
         surveyed: DiskTiles::open(step.path())?,
-        motion: epoch.motion.clone(),
+        motion: epoch.motion.clone().map(KnownMotion::of_points),
     };
 
     if tiles.tile_count() == 0 {

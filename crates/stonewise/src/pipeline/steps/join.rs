@@ -4,7 +4,7 @@
 //! them. Photos of another epoch, in another light, then outvote them. This step comes after the vote of the
 //! photos of one epoch and before stones are carried. Epochs with masks stay as they are.
 
-use super::label::{DiskLabels, Labelled, Labels, STONES, tabulate};
+use super::label::{Labelled, Labels, STONES, tabulate};
 use super::segment::Segmented;
 use super::shapes::{Matches, Others, is_corrected, shapes};
 use crate::error::Result;
@@ -12,6 +12,7 @@ use crate::files::{read_json, write_json};
 use crate::pipeline::cost::Cost;
 use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::until::Until;
+use crate::storage::labels::DiskLabels;
 use crate::storage::step::Key;
 use nalgebra::Vector3;
 use serde::Serialize;

@@ -52,7 +52,10 @@ impl Run<'_> {
 /// Compares two epochs along the normals of the reference, in whatever direction is outwards.
 pub fn m3c2(run: &Run, later: EpochId, outward: &OutwardReference) -> Result<StepDir> {
     let (clouds, params) = (run.clouds(later)?, &run.context.project.settings.m3c2);
-    let motions = clouds.each_ref().map(|e| &e.tiles.motion).into_array();
+    let motions = clouds
+        .each_ref()
+        .map(|e| e.tiles.motion.as_ref().map(|m| &m.field))
+        .into_array();
     let keys = clouds.each_ref().map(|e| e.step.key().as_str()).into_array();
     let key = Key::new("m3c2", &(params, motions), &keys);
     run.context.step(&format!("m3c2-{later}"), key, |step, _| {

@@ -30,7 +30,7 @@ const UNSOLVABLE: f64 = f64::MAX / 1e6;
 
 /// Variance components under which the stones' normal equations are most likely, field integrated out.
 ///
-/// A Newton step in the logarithms from parabolas along each, then a search along it. Cost: at most 6 x 21
+/// A Newton step in the logarithms from parabolas along each, then a search along it. Cost: at most 6 x 19
 /// factorisations.
 ///
 /// # Errors
@@ -143,8 +143,8 @@ mod tests {
     use crate::registration::adjustment::field::testing::SmallWall;
     use crate::registration::adjustment::observation::NormalEquations;
     use crate::registration::adjustment::observation::photo::{BiasWeights, PoseInfluence, StonePhotos};
-    use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
-    use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+    use crate::registration::adjustment::stone_vector::StoneVector;
+    use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -165,10 +165,10 @@ mod tests {
     /// All stones' frames on the diagonal.
     fn frames(problem: &FieldProblem) -> DMatrix<f64> {
         let n = problem.stones.len();
-        let mut all = DMatrix::zeros(9 * n, 9 * n);
+        let mut all = DMatrix::zeros(6 * n, 9 * n);
         for (i, node) in problem.graph.nodes.iter().enumerate() {
             let a = stone_from_field(&node.face_from_world);
-            all.view_mut((9 * i, 9 * i), (9, 9)).copy_from(&a);
+            all.view_mut((6 * i, 9 * i), (6, 9)).copy_from(&a);
         }
         all
     }
@@ -200,13 +200,13 @@ mod tests {
             );
             let own = components.with_error(components.own_variances());
             let mut covariance = &a * field.try_inverse().unwrap() * a.transpose();
-            let mut observed = DVector::zeros(9 * n);
+            let mut observed = DVector::zeros(6 * n);
             for (i, stone) in problem.stones.iter().enumerate() {
                 let noise = stone.equations.information.try_inverse().unwrap();
-                let mut block = covariance.view_mut((9 * i, 9 * i), (9, 9));
-                block += noise + Matrix9::from_diagonal(&Vector9::from(own));
+                let mut block = covariance.view_mut((6 * i, 6 * i), (6, 6));
+                block += noise + Matrix6::from_diagonal(&Vector6::from(own));
                 observed
-                    .rows_mut(9 * i, 9)
+                    .rows_mut(6 * i, 6)
                     .copy_from(&(noise * stone.equations.vector));
             }
             normal_deviance(covariance, &observed)
@@ -225,7 +225,7 @@ mod tests {
         // Without correlation between the face and what is across it an error in the face is plainly an error
         // there.
         for equations in &mut wall.equations {
-            for (r, c) in (0..9).flat_map(|r| (0..9).map(move |c| (r, c))) {
+            for (r, c) in (0..6).flat_map(|r| (0..6).map(move |c| (r, c))) {
                 if [0, 1, 5].contains(&r) != [0, 1, 5].contains(&c) {
                     equations.information[(r, c)] = 0.0;
                 }
@@ -268,33 +268,33 @@ mod tests {
                 &problem,
             );
             let mut motion = &a * field.try_inverse().unwrap() * a.transpose();
-            let mut observe = DMatrix::<f64>::zeros(12 * n, 9 * n);
-            let mut noise = DMatrix::<f64>::zeros(12 * n, 12 * n);
-            let mut observed = DVector::<f64>::zeros(12 * n);
-            let clouds_own = components.with_error([0.0; 9]);
+            let mut observe = DMatrix::<f64>::zeros(9 * n, 6 * n);
+            let mut noise = DMatrix::<f64>::zeros(9 * n, 9 * n);
+            let mut observed = DVector::<f64>::zeros(9 * n);
+            let clouds_own = components.with_error([0.0; 6]);
             for (i, (stone, photos)) in problem.stones.iter().zip(&photos).enumerate() {
-                let mut block = motion.view_mut((9 * i, 9 * i), (9, 9));
-                block += Matrix9::from_diagonal(&Vector9::from(components.own_variances()));
-                observe.view_mut((12 * i, 9 * i), (9, 9)).fill_with_identity();
+                let mut block = motion.view_mut((6 * i, 6 * i), (6, 6));
+                block += Matrix6::from_diagonal(&Vector6::from(components.own_variances()));
+                observe.view_mut((9 * i, 6 * i), (6, 6)).fill_with_identity();
                 observe
-                    .view_mut((12 * i + 9, 9 * i), (3, 9))
+                    .view_mut((9 * i + 6, 6 * i), (3, 6))
                     .copy_from(&StonePhotos::lever(photos.place));
                 let of_clouds = stone.equations.information.try_inverse().unwrap();
                 observed
-                    .rows_mut(12 * i, 9)
+                    .rows_mut(9 * i, 6)
                     .copy_from(&(of_clouds * stone.equations.vector));
-                let error = Matrix9::from_diagonal(&Vector9::from(clouds_own));
+                let error = Matrix6::from_diagonal(&Vector6::from(clouds_own));
                 noise
-                    .view_mut((12 * i, 12 * i), (9, 9))
+                    .view_mut((9 * i, 9 * i), (6, 6))
                     .copy_from(&(of_clouds + error));
                 let of_photos = photos.information.try_inverse().unwrap();
                 observed
-                    .rows_mut(12 * i + 9, 3)
+                    .rows_mut(9 * i + 6, 3)
                     .copy_from(&(of_photos * photos.vector));
                 let bias = components.appearance_m().powi(2) * photos.bias_factor;
                 let bias = Matrix3::from_diagonal(&Vector3::new(bias, bias, 0.0));
                 noise
-                    .view_mut((12 * i + 9, 12 * i + 9), (3, 3))
+                    .view_mut((9 * i + 6, 9 * i + 6), (3, 3))
                     .copy_from(&(of_photos + bias));
             }
             let covariance = &observe * motion * observe.transpose() + noise;
@@ -327,14 +327,14 @@ mod tests {
         let white = DVector::from_fn(9 * 140, |_, _| gauss());
         let drawn = frames(&problem) * root.l().transpose().solve_upper_triangular(&white).unwrap();
         let own = truth.with_error(truth.own_variances());
-        let weights = Vector9::from([1e8, 1e8, 1e8, 1e7, 1e7, 1e7, 1e4, 1e4, 1e4]);
+        let weights = Vector6::<f64>::from([1e8, 1e8, 1e8, 1e7, 1e7, 1e7]);
         let equations: Vec<NormalEquations> = (0..140)
             .map(|i| {
-                let moved = Vector9::from_fn(|k, _| {
-                    drawn[9 * i + k] + gauss() * own[k].sqrt() + gauss() / weights[k].sqrt()
+                let moved = Vector6::from_fn(|k, _| {
+                    drawn[6 * i + k] + gauss() * own[k].sqrt() + gauss() / weights[k].sqrt()
                 });
                 NormalEquations {
-                    information: Matrix9::from_diagonal(&weights),
+                    information: Matrix6::from_diagonal(&weights),
                     vector: weights.component_mul(&moved),
                     constant: 0.0,
                 }

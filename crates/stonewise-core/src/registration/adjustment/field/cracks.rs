@@ -192,8 +192,8 @@ mod tests {
     use crate::registration::adjustment::field::graph::Place;
     use crate::registration::adjustment::field::solve::solve;
     use crate::registration::adjustment::field::testing::SmallWall;
-    use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
-    use nalgebra::Point3;
+    use crate::registration::adjustment::stone_vector::StoneVector;
+    use nalgebra::{Matrix6, Point3, Vector6};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
@@ -208,8 +208,8 @@ mod tests {
             let mut noise = || 1e-3 * stonewise_testing::normal(&mut rng);
             let noise = Vector3::new(noise(), noise(), noise());
             let seen = frame * (if side[i] { jump } else { Vector3::zeros() }) + noise;
-            let weights = [1e6, 1e6, 1e6, 1e3, 1e3, 1e3, 0.0, 0.0, 0.0];
-            equations.information = Matrix9::from_diagonal(&Vector9::from(weights));
+            let weights = [1e6, 1e6, 1e6, 1e3, 1e3, 1e3];
+            equations.information = Matrix6::from_diagonal(&Vector6::from(weights));
             equations.vector = equations.information * StoneVector::from_translation(seen).unknowns();
         }
         (wall, side)

@@ -150,7 +150,8 @@ mod tests {
     use crate::registration::adjustment::field::testing::SmallWall;
     use crate::registration::adjustment::field::variance_components::VarianceComponents;
     use crate::registration::adjustment::observation::NormalEquations;
-    use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
+    use crate::registration::adjustment::stone_vector::StoneVector;
+    use nalgebra::{Matrix6, Vector6};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use std::f64::consts::PI;
@@ -164,11 +165,11 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut wall = SmallWall::new(COLUMNS as u32, 10, 1);
         let weight = 1.0 / (SD_M * SD_M);
-        let weights = Vector9::from([weight, weight, weight, 1e4, 1e4, 1e4, 1e2, 1e2, 1e2]);
+        let weights = Vector6::from([weight, weight, weight, 1e4, 1e4, 1e4]);
         for (k, equations) in wall.equations.iter_mut().enumerate() {
             let noise = Vector3::from_fn(|_, _| SD_M * stonewise_testing::normal(&mut rng));
             let moved = motion((k % COLUMNS) as f64, (k / COLUMNS) as f64) + noise;
-            equations.information = Matrix9::from_diagonal(&weights);
+            equations.information = Matrix6::from_diagonal(&weights);
             equations.vector = equations.information * StoneVector::from_translation(moved).unknowns();
         }
         wall

@@ -88,9 +88,9 @@ mod tests {
     use crate::linalg::BlockMatrix;
     use crate::registration::adjustment::field::eliminate::eliminate_own_motions;
     use crate::registration::adjustment::field::field_vector::stone_from_field;
+    use crate::registration::adjustment::field::field_vector::{Matrix9, Vector9};
     use crate::registration::adjustment::field::prior::prior;
     use crate::registration::adjustment::field::testing::SmallWall;
-    use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
     use nalgebra::{DMatrix, DVector};
 
     /// A jump and its excess, from the whole matrix with three more unknowns, densely.

@@ -19,8 +19,8 @@ pub(crate) struct LoosePrior {
 }
 
 impl LoosePrior {
-    /// Variances of a loose stone's own (translation, rotation, bending) in its frame.
-    pub fn own_variances(&self, components: &VarianceComponents) -> [f64; 9] {
+    /// Variances of a loose stone's own (translation, rotation) in its frame.
+    pub fn own_variances(&self, components: &VarianceComponents) -> [f64; 6] {
         let mut own = components.own_variances();
         for k in 0..3 {
             own[k] += self.move_m * self.move_m;

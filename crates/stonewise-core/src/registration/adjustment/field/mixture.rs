@@ -15,10 +15,10 @@ pub(crate) fn probabilities_with_field(
     problem: &FieldProblem,
     on_own: &[Option<&NormalEquations>],
     field: &Field,
-    shared: &[f64; 9],
+    shared: &[f64; 6],
     shares: &[f64],
 ) -> Vec<f64> {
-    let own: [[f64; 9]; 2] = problem
+    let own: [[f64; 6]; 2] = problem
         .own_variances()
         .map(|own| std::array::from_fn(|k| own[k] + shared[k]));
     (0..problem.stones.len())
@@ -39,7 +39,7 @@ pub(crate) fn probabilities_with_field(
 pub(crate) fn log_odds_of_loose(
     equations: [&NormalEquations; 2],
     prediction: &Prediction,
-    own: &[[f64; 9]; 2],
+    own: &[[f64; 6]; 2],
     share: f64,
 ) -> f64 {
     let [tied, loose] = [0, 1].map(|k| posterior(equations[k], prediction, &own[k]).log_evidence);
@@ -51,20 +51,20 @@ mod tests {
     use super::*;
     use crate::registration::adjustment::field::solve::solve;
     use crate::registration::adjustment::field::testing::{LOOSE, SmallWall};
-    use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
-    use nalgebra::Vector3;
+    use crate::registration::adjustment::stone_vector::StoneVector;
+    use nalgebra::{Matrix6, Vector3, Vector6};
 
     #[test]
     fn the_probability_is_bayes_rule_between_two_gaussians() {
         let mut wall = SmallWall::new(5, 4, 1);
-        let weights = Vector9::from([1e7, 1e7, 1e7, 1e5, 1e5, 1e5, 1e2, 1e2, 1e2]);
+        let weights = Vector6::from([1e7, 1e7, 1e7, 1e5, 1e5, 1e5]);
         for (k, equations) in wall.equations.iter_mut().enumerate() {
             let own = if k == 7 {
                 Vector3::new(0.0, 0.0, 0.006)
             } else {
                 Vector3::zeros()
             };
-            equations.information = Matrix9::from_diagonal(&weights);
+            equations.information = Matrix6::from_diagonal(&weights);
             equations.vector = equations.information * StoneVector::from_translation(own).unknowns();
         }
         let problem = wall.problem(1.0);
@@ -73,17 +73,14 @@ mod tests {
             &problem,
             &[None; 20],
             &field,
-            &[0.0; 9],
+            &[0.0; 6],
             &[problem.loose.share; 20],
         );
         for (i, (p, prediction)) in found.iter().zip(&field.from_others).enumerate() {
-            let density = |own: [f64; 9]| {
-                let mut covariance = Matrix9::from_diagonal(&(Vector9::from(own) + weights.map(|w| 1.0 / w)));
-                let mut part = covariance.fixed_view_mut::<6, 6>(0, 0);
-                part += prediction.covariance;
-                let mut apart = problem.stones[i].equations.vector.component_div(&weights);
-                let mut rows = apart.fixed_rows_mut::<6>(0);
-                rows -= prediction.mean;
+            let density = |own: [f64; 6]| {
+                let noise = Matrix6::from_diagonal(&(Vector6::from(own) + weights.map(|w| 1.0 / w)));
+                let covariance = noise + prediction.covariance;
+                let apart = problem.stones[i].equations.vector.component_div(&weights) - prediction.mean;
                 let factor = covariance.cholesky().unwrap();
                 let log_det = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
                 -0.5 * (apart.dot(&factor.solve(&apart)) + log_det)

@@ -25,7 +25,9 @@ pub(crate) use component_estimate::most_likely_components;
 pub(crate) use cracks::Crack;
 pub(crate) use cracks::find_crack;
 pub(crate) use creep::{LeftOver, creeping_zone};
-pub(crate) use field_vector::{FieldVector, stone_from_field};
+#[cfg(test)]
+pub(crate) use field_vector::Vector9;
+pub(crate) use field_vector::{FieldVector, Matrix9, stone_from_field};
 pub(crate) use graph::{Edge, Graph, Node, Place};
 pub(crate) use loose_prior::{LoosePrior, estimated_share};
 pub(crate) use mixture::{log_odds_of_loose, probabilities_with_field};

@@ -50,14 +50,13 @@ impl MotionPrior {
         )
     }
 
-    /// Variances of the (translation, rotation, bending) that a stone of the field makes on its own, in its
-    /// frame.
-    pub fn own_variances(&self) -> [f64; 9] {
+    /// Variances of the (translation, rotation) that a stone of the field makes on its own, in its frame.
+    pub fn own_variances(&self) -> [f64; 6] {
         self.components.own_variances()
     }
 
     /// Variances of the motion that a loose stone makes on its own.
-    pub fn loose_variances(&self) -> [f64; 9] {
+    pub fn loose_variances(&self) -> [f64; 6] {
         self.loose.own_variances(&self.components)
     }
 

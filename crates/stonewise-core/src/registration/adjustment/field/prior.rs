@@ -6,7 +6,7 @@
 use super::graph::{Edge, Graph};
 use super::variance_components::VarianceComponents;
 use crate::linalg::BlockMatrix;
-use crate::registration::adjustment::stone_vector::Matrix9;
+use crate::registration::adjustment::field::field_vector::Matrix9;
 use nalgebra::{Matrix3, Vector3};
 
 /// The state of the tie between two neighbours.

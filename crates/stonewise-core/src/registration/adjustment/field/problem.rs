@@ -85,7 +85,7 @@ impl<'a> FieldProblem<'a> {
     }
 
     /// Variances of what stones do beside the field: those that move with it, and loose ones.
-    pub fn own_variances(&self) -> [[f64; 9]; 2] {
+    pub fn own_variances(&self) -> [[f64; 6]; 2] {
         [
             self.components.own_variances(),
             self.loose.own_variances(&self.components),

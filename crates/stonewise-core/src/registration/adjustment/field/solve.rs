@@ -4,12 +4,11 @@
 //! for nearly all stones and large for loose ones (a mixture).
 
 use super::eliminate::{Eliminated, eliminate_own_motions};
-use super::field_vector::{FieldVector, stone_from_field};
+use super::field_vector::{FieldVector, Matrix9, StoneFromField, Vector9, stone_from_field};
 use super::posterior::Prediction;
 use super::prior::prior;
 use super::problem::FieldProblem;
 use crate::linalg::{BlockFactor, BlockMatrix, SelectedInverse};
-use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector6};
 use rayon::prelude::*;
 
@@ -118,13 +117,10 @@ fn mean_covariance(factor: &BlockFactor<9>, stones: usize) -> Matrix3<f64> {
 
 /// Takes a stone's own information back out of the field at the stone. `a` takes field unknowns to the
 /// stone's motion.
-fn without_own(a: &Matrix9, state: &Vector9, covariance: &Matrix9, own: &Eliminated) -> Prediction {
-    let mean: Vector6<f64> = (a * state).fixed_rows::<6>(0).into_owned();
-    let with: Matrix6<f64> = (a * covariance * a.transpose())
-        .fixed_view::<6, 6>(0, 0)
-        .into_owned();
-    let m = own.information.fixed_view::<6, 6>(0, 0).into_owned();
-    let v = own.vector.fixed_rows::<6>(0).into_owned();
+fn without_own(a: &StoneFromField, state: &Vector9, covariance: &Matrix9, own: &Eliminated) -> Prediction {
+    let mean: Vector6<f64> = a * state;
+    let with: Matrix6<f64> = a * covariance * a.transpose();
+    let (m, v) = (own.information, own.vector);
     // Q_l = Q (I - M Q)^-1, mu_l = (I - Q M)^-1 (mu - Q v): no inverse of Q, which may be nearly singular.
     let left = Matrix6::identity() - with * m;
     match left.try_inverse() {

@@ -6,8 +6,7 @@ use super::prior::{Least, Tie};
 use super::problem::{FieldProblem, FieldStone};
 use super::variance_components::VarianceComponents;
 use crate::registration::adjustment::observation::NormalEquations;
-use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix6, Point3, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -45,10 +44,10 @@ impl SmallWall {
             .nodes
             .iter()
             .map(|_| {
-                let m = Matrix9::from_fn(|_, _| rng.random_range(-1.0..1.0));
+                let m = Matrix6::from_fn(|_, _| rng.random_range(-1.0..1.0));
                 NormalEquations {
-                    information: (m * m.transpose() + Matrix9::identity()) * 1e5,
-                    vector: Vector9::from_fn(|_, _| rng.random_range(-1.0..1.0)) * 1e3,
+                    information: (m * m.transpose() + Matrix6::identity()) * 1e5,
+                    vector: Vector6::from_fn(|_, _| rng.random_range(-1.0..1.0)) * 1e3,
                     constant: 0.0,
                 }
             })

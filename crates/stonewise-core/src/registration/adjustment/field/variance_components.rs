@@ -1,6 +1,5 @@
 //! The variance components of the adjustment.
 
-use crate::switches::where_on;
 use serde::{Deserialize, Serialize};
 
 /// How unlike neighbouring stones may move: standard deviations, estimated from the survey itself.
@@ -22,8 +21,6 @@ pub struct VarianceComponents {
     pub error_m: f64,
     /// A stone's own rotation beside that of the field, radians.
     pub own_rad: f64,
-    /// Bending of a stone's face, 1/m.
-    pub bending_per_m: f64,
     /// Appearance bias of a stone between the epochs in the photos, metres, along each axis of the face:
     /// light, moisture and moss move what all photos of an epoch show alike. Absent where photos take no
     /// part.
@@ -40,7 +37,7 @@ const RARE_M: f64 = 5e-4;
 const RARE_RAD: f64 = 5e-3;
 
 /// Number of components; the last one counts where photos take part.
-pub(crate) const COUNT: usize = 9;
+pub(crate) const COUNT: usize = 8;
 /// Least appearance bias, metres: a thirtieth of a pixel, the accuracy expected of interpolation and lens
 /// model.
 pub(crate) const LEAST_APPEARANCE_M: f64 = 1e-4;
@@ -57,7 +54,6 @@ impl VarianceComponents {
             own_m: 5e-4,
             error_m: 5e-4,
             own_rad: 2e-3,
-            bending_per_m: 0.01,
             appearance_m: None,
         }
     }
@@ -97,7 +93,6 @@ impl VarianceComponents {
             self.error_m,
             self.own_m,
             self.own_rad,
-            self.bending_per_m,
             self.appearance_m.unwrap_or(START_APPEARANCE_M),
         ]
         .map(f64::ln)
@@ -112,8 +107,7 @@ impl VarianceComponents {
             error_m: v[4],
             own_m: v[5],
             own_rad: v[6],
-            bending_per_m: v[7],
-            appearance_m: (count == COUNT).then_some(v[8]),
+            appearance_m: (count == COUNT).then_some(v[7]),
         }
     }
 
@@ -123,19 +117,14 @@ impl VarianceComponents {
         RATE * ((self.error_m + self.own_m) / RARE_M + self.own_rad / RARE_RAD)
     }
 
-    /// Variances of a stone's own (translation, rotation, bending) in its frame.
-    pub(crate) fn own_variances(&self) -> [f64; 9] {
-        let (i, o, r, b) = (
-            NONE_M,
-            self.own_m,
-            self.own_rad,
-            where_on("bending", self.bending_per_m, 1e-6),
-        );
-        [i, i, o, r, r, r, b, b, b].map(|s| s * s)
+    /// Variances of a stone's own (translation, rotation) in its frame.
+    pub(crate) fn own_variances(&self) -> [f64; 6] {
+        let (i, o, r) = (NONE_M, self.own_m, self.own_rad);
+        [i, i, o, r, r, r].map(|s| s * s)
     }
 
     /// Adds the variance of the error in the face to such variances.
-    pub(crate) fn with_error(&self, mut variances: [f64; 9]) -> [f64; 9] {
+    pub(crate) fn with_error(&self, mut variances: [f64; 6]) -> [f64; 6] {
         for v in &mut variances[..2] {
             *v += self.error_m * self.error_m;
         }
@@ -159,7 +148,6 @@ const NAMES: [&str; COUNT] = [
     "error_m",
     "own_m",
     "own_rad",
-    "bending_per_m",
     "appearance_m",
 ];
 
@@ -172,7 +160,6 @@ pub(crate) const BOUNDS: [[f64; 2]; COUNT] = [
     [NONE_M, 6e-3],
     [NONE_M, 6e-3],
     [1e-5, 1.5e-2],
-    [1e-4, 0.5],
     [LEAST_APPEARANCE_M, 6e-3],
 ];
 
@@ -198,7 +185,7 @@ mod tests {
         let mut log = start.to_log();
         log[TILT] = BOUNDS[TILT][1].ln();
         log[4] = BOUNDS[4][1].ln();
-        log[8] = BOUNDS[8][1].ln();
+        log[7] = BOUNDS[7][1].ln();
         let found = |count| VarianceComponents::from_log(log, count).at_upper_bound();
         assert_eq!(found(COUNT - 1), ["error_m"]);
         assert_eq!(found(COUNT), ["error_m", "appearance_m"]);
@@ -212,7 +199,7 @@ mod tests {
         };
         let own = components.own_variances();
         let with_error = components.with_error(own);
-        for k in 0..9 {
+        for k in 0..6 {
             let added = if k < 2 { 9e-8 } else { 0.0 };
             assert!((with_error[k] - own[k] - added).abs() < 1e-18);
         }

@@ -7,8 +7,8 @@ use super::likelihood_ratio::Placed;
 use crate::registration::adjustment::observation::surface::{
     Equations, LocalPair, PointWeights, SurfaceModel,
 };
-use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector};
-use nalgebra::Vector3;
+use crate::registration::adjustment::stone_vector::StoneVector;
+use nalgebra::{Matrix6, Vector3};
 use std::f64::consts::TAU;
 
 /// Directions in the face in which a stone is tried, 45 degrees apart: neighbouring places are then nearer to
@@ -69,7 +69,7 @@ impl Probe<'_> {
     /// Deviance after a step that the prior of loose stones holds back, and that goes no farther along the face
     /// than half the way to another place: beyond, the equations there say more.
     fn expected_deviance(&self, e: &Equations) -> f64 {
-        let held = e.information + Matrix9::identity() * self.inflation / self.move_m.powi(2);
+        let held = e.information + Matrix6::identity() * self.inflation / self.move_m.powi(2);
         held.cholesky().map_or(f64::INFINITY, |c| {
             let step = c.solve(&e.gradient);
             let share = (0.5 * self.move_m / step.xy().norm()).min(1.0);
@@ -82,8 +82,7 @@ impl Probe<'_> {
 mod tests {
     use super::*;
     use crate::registration::adjustment::observation::surface::{Layout, SurfaceNoise, without_points};
-    use crate::registration::adjustment::stone_vector::Vector9;
-    use nalgebra::Rotation2;
+    use nalgebra::{Rotation2, Vector6};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -147,7 +146,7 @@ mod tests {
             let angle = found.translation().angle(&truth);
             assert!(angle < TAU / DIRECTIONS as f64 + 1e-9, "{k}: {angle}");
             let there = surface.equations(&pair, &found, &zero, &PointWeights::NONE);
-            let held = there.information + Matrix9::identity() / MOVE_M.powi(2);
+            let held = there.information + Matrix6::identity() / MOVE_M.powi(2);
             let step = held.cholesky().unwrap().solve(&there.gradient);
             let error = found.translation() - step.fixed_rows::<3>(0) - truth;
             assert!(error.norm() < 0.3 * MOVE_M, "{k}: {error}");
@@ -190,17 +189,17 @@ mod tests {
     #[test]
     fn the_expected_deviance_is_the_least_of_the_held_quadratic() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let root = Matrix9::from_fn(|_, _| rng.random_range(-1.0..1.0));
+        let root = Matrix6::from_fn(|_, _| rng.random_range(-1.0..1.0));
         let mut equations = without_points();
         equations.information = root * root.transpose() * 1e4;
-        equations.gradient = Vector9::from_fn(|_, _| rng.random_range(-3.0..3.0));
+        equations.gradient = Vector6::from_fn(|_, _| rng.random_range(-3.0..3.0));
         equations.deviance = 17.0;
         let (pair, surface) = (scans([0.0; 2]), model());
         let mut probe = probe(&pair, &surface);
         probe.inflation = 3.0;
         // Coordinate by coordinate, the quadratic is minimised without a factorisation.
-        let held = equations.information + Matrix9::identity() * (3.0 / MOVE_M.powi(2));
-        let mut x = Vector9::zeros();
+        let held = equations.information + Matrix6::identity() * (3.0 / MOVE_M.powi(2));
+        let mut x = Vector6::zeros();
         for _ in 0..2000 {
             for k in 0..9 {
                 x[k] -= (equations.gradient[k] + held.row(k).dot(&x.transpose())) / held[(k, k)];

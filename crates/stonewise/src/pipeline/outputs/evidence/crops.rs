@@ -7,12 +7,12 @@ use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::segment::Segmented;
 use crate::results::{Crop, StoneRow, crop_side_px, write_crops};
+use crate::storage::epoch_tiles::KnownMotion;
 use crate::texts::notices::PHOTO_NOT_SHOWN;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use stonewise_core::epoch::EpochId;
-use stonewise_core::evaluate::MotionField;
 use stonewise_core::geometry::{View, signed_area, simplify_ring};
 use stonewise_core::id::ImageId;
 use stonewise_core::raster::{LabelImage, Raster, RgbImage, label_outlines};
@@ -158,7 +158,7 @@ fn job<'a>(
     window: &'a Window,
     instances: Option<&&[(ImageId, stonewise_core::id::InstanceId)]>,
     views: &[View],
-    motion: Option<&MotionField>,
+    motion: Option<&KnownMotion>,
 ) -> Option<Job<'a>> {
     let list = instances.map_or(&[][..], |i| *i);
     let of_photo = |photo: usize| {
@@ -183,16 +183,13 @@ fn job<'a>(
 }
 
 /// Where a point of the moved cloud was when the photos were taken.
-fn photographed(p: Point3<f64>, motion: Option<&MotionField>) -> Point3<f64> {
-    let Some(field) = motion else { return p };
-    // Two steps of p = w - d(p): the fields are smooth and small.
-    let first = p - field.displacement_at(&p);
-    p - field.displacement_at(&first)
+fn photographed(p: Point3<f64>, motion: Option<&KnownMotion>) -> Point3<f64> {
+    motion.map_or(p, |motion| motion.before(&p))
 }
 
 /// Area of the window in a photo, square pixels; `None` where a corner lies outside or it is seen from
 /// behind.
-fn area_px(window: &Window, view: &View, motion: Option<&MotionField>) -> Option<f64> {
+fn area_px(window: &Window, view: &View, motion: Option<&KnownMotion>) -> Option<f64> {
     let h = window.half_m;
     let mut corners = Vec::with_capacity(4);
     // Clockwise on the screen, where y points down.
@@ -208,12 +205,12 @@ fn area_px(window: &Window, view: &View, motion: Option<&MotionField>) -> Option
 }
 
 /// Edge of a crop at the photo's own resolution, pixels.
-fn natural_px(window: &Window, view: &View, motion: Option<&MotionField>) -> f64 {
+fn natural_px(window: &Window, view: &View, motion: Option<&KnownMotion>) -> f64 {
     area_px(window, view, motion).unwrap_or(0.0).sqrt()
 }
 
 /// Resamples a photo on the plane of a stone's face, and outlines its mask there.
-fn cut(job: &Job, open: &OpenPhoto, motion: Option<&MotionField>, side_px: u32) -> (Crop, Vec<[u8; 3]>) {
+fn cut(job: &Job, open: &OpenPhoto, motion: Option<&KnownMotion>, side_px: u32) -> (Crop, Vec<[u8; 3]>) {
     let OpenPhoto {
         name,
         view,

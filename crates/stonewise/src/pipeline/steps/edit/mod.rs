@@ -8,7 +8,7 @@ mod boxes;
 mod photo_places;
 
 use super::confirm::CONFIRM;
-use super::label::{DiskLabels, Labelled, Labels, last_number, tabulate};
+use super::label::{Labelled, Labels, last_number, tabulate};
 use super::stone_outlines::make_outlines;
 use crate::edits::EditsFile;
 use crate::error::Result;
@@ -17,6 +17,7 @@ use crate::pipeline::cost::Cost;
 use crate::pipeline::graph::{Need, Run, Step};
 use crate::pipeline::until::Until;
 use crate::results::{Facade, facade_of, read_outlines};
+use crate::storage::labels::DiskLabels;
 use crate::storage::step::Key;
 use boxes::Places;
 use nalgebra::Point3;

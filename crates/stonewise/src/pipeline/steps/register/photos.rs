@@ -8,6 +8,7 @@ use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::segment::Segmented;
 use crate::project::Project;
 use crate::results::track_side_px;
+use crate::storage::epoch_tiles::KnownMotion;
 use crate::storage::spill::{Spill, SpillBins};
 use crate::storage::step::StepDir;
 use crate::texts::notices::PHOTO_NOT_TRACKED;
@@ -16,7 +17,6 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use stonewise_core::epoch::{EpochId, Pair};
-use stonewise_core::evaluate::SeenBeforeMotion;
 use stonewise_core::geometry::{Bounds, FaceFrame, View};
 use stonewise_core::raster::RgbImage;
 use stonewise_core::registration::PairSource;
@@ -140,11 +140,33 @@ fn has_rolling_shutter(project: &Project) -> Result<bool> {
     Ok(false)
 }
 
-/// A moved point was where it was when the photo was taken: the camera of a self-check sees it there.
 fn camera(view: &View, labelled: &Labelled) -> Box<dyn PhotoCamera> {
     match &labelled.ingested.tiles.motion {
         None => Box::new(view.clone()),
-        Some(field) => Box::new(SeenBeforeMotion::new(view.clone(), field.clone())),
+        Some(motion) => Box::new(SeenBeforeMotion {
+            view: view.clone(),
+            motion: motion.clone(),
+        }),
+    }
+}
+
+/// The camera of a self-check: it sees moved points where they were when the photo was taken.
+struct SeenBeforeMotion {
+    view: View,
+    motion: KnownMotion,
+}
+
+impl PhotoCamera for SeenBeforeMotion {
+    fn project(&self, world: &Point3<f64>) -> Option<[f64; 2]> {
+        PhotoCamera::project(&self.view, &self.motion.before(world))
+    }
+
+    fn centre(&self) -> Point3<f64> {
+        PhotoCamera::centre(&self.view)
+    }
+
+    fn height_px(&self) -> f64 {
+        self.view.height_px()
     }
 }
 

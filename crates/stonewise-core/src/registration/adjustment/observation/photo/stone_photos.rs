@@ -5,8 +5,8 @@ use super::poses::PoseInfluence;
 use super::stone_turn::StoneTurn;
 use crate::registration::adjustment::candidate::Moving;
 use crate::registration::adjustment::observation::normal_equations::NormalEquations;
-use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
-use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
+use crate::registration::adjustment::stone_vector::StoneVector;
+use nalgebra::{Matrix2, Matrix3, Matrix3x6, Matrix6, Vector3, Vector6};
 
 /// Relative ridge that makes a direction solvable which no photo shows.
 const RIDGE: f64 = 1e-9;
@@ -35,8 +35,8 @@ pub(crate) struct StonePhotos {
 
 impl StonePhotos {
     /// Takes a stone's motion to the displacement of the place.
-    pub fn lever(place: [f64; 2]) -> SMatrix<f64, 3, 9> {
-        let mut lever = SMatrix::<f64, 3, 9>::zeros();
+    pub fn lever(place: [f64; 2]) -> Matrix3x6<f64> {
+        let mut lever = Matrix3x6::zeros();
         lever.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
         let [u, v] = place;
         lever[(0, 5)] = -v;
@@ -92,7 +92,7 @@ impl StonePhotos {
         bias_m: f64,
         moving: Moving,
         expected: &StoneVector,
-        covariance: &Matrix9,
+        covariance: &Matrix6<f64>,
     ) -> f64 {
         let lever = Self::lever(self.place);
         let weight = self.weights.of(moving);
@@ -133,7 +133,7 @@ impl StonePhotos {
         let pull = vector - information * at_origin;
         let peak = self.displacement().unwrap_or_else(Vector3::zeros);
         let apart = peak - at_origin;
-        let vector: Vector9 = lever.transpose() * pull;
+        let vector: Vector6<f64> = lever.transpose() * pull;
         NormalEquations {
             information: lever.transpose() * information * lever,
             vector,
@@ -145,7 +145,7 @@ impl StonePhotos {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Matrix4, RowVector3, Vector4};
+    use nalgebra::{Matrix4, Matrix4x6, RowVector3, Vector4};
 
     fn stone() -> StonePhotos {
         let m = Matrix3::new(2.0, 0.3, 0.1, 0.3, 1.5, -0.2, 0.1, -0.2, 0.1) * 1e6;
@@ -167,9 +167,9 @@ mod tests {
 
     /// What the photos show, side by side: how it follows from the motion, its value, its covariance without
     /// the bias, and the covariance of a bias with variance one.
-    fn observed(stone: &StonePhotos) -> (SMatrix<f64, 4, 9>, Vector4<f64>, Matrix4<f64>, Matrix4<f64>) {
+    fn observed(stone: &StonePhotos) -> (Matrix4x6<f64>, Vector4<f64>, Matrix4<f64>, Matrix4<f64>) {
         let turn = stone.turn.as_ref().unwrap();
-        let mut lever = SMatrix::<f64, 4, 9>::zeros();
+        let mut lever = Matrix4x6::zeros();
         // A point at r moves by t + w x r.
         let arm = Vector3::new(stone.place[0], stone.place[1], 0.0);
         lever.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
@@ -205,11 +205,9 @@ mod tests {
     #[test]
     fn the_squared_bias_is_its_expectation_in_the_joint_law() {
         let (stone, bias_m) = (stone(), 8e-4);
-        let expected = StoneVector::from(Vector9::from([
-            0.001, 0.0005, 0.003, 0.01, 0.0, 0.016, 0.0, 0.0, 0.0,
-        ]));
-        let sds = Vector9::from([4e-4, 6e-4, 2e-4, 5e-3, 2e-3, 3e-3, 0.0, 0.0, 0.0]);
-        let covariance = Matrix9::from_diagonal(&sds.component_mul(&sds));
+        let expected = StoneVector::from(Vector6::from([0.001, 0.0005, 0.003, 0.01, 0.0, 0.016]));
+        let sds = Vector6::from([4e-4, 6e-4, 2e-4, 5e-3, 2e-3, 3e-3]);
+        let covariance = Matrix6::from_diagonal(&sds.component_mul(&sds));
         // What is shown is the true motion's part plus bias and error, all jointly normal; turn and
         // displacement are correlated only through the offset of the place from the centroid.
         let (lever, shown, noise, of_bias) = observed(&stone);
@@ -240,19 +238,19 @@ mod tests {
     #[test]
     fn equations_are_the_log_density_of_displacement_and_turn() {
         let stone = stone();
-        let x = Vector9::from([0.004, -0.002, 0.001, 0.01, -0.02, 0.03, 0.0, 0.0, 0.0]);
+        let x = Vector6::from([0.004, -0.002, 0.001, 0.01, -0.02, 0.03]);
         let origin = StoneVector::from_translation(Vector3::new(0.002, 0.001, -0.003));
         let (lever, shown, noise, of_bias) = observed(&stone);
-        let density = |x: &Vector9, bias_m: f64| {
+        let density = |x: &Vector6<f64>, bias_m: f64| {
             let covariance = noise + of_bias * (bias_m * bias_m * 1.7);
             let apart = shown - lever * (x + origin.unknowns());
             -0.5 * (covariance.determinant().ln() + apart.dot(&(covariance.try_inverse().unwrap() * apart)))
         };
-        let value = |x: &Vector9, bias_m: f64| {
+        let value = |x: &Vector6<f64>, bias_m: f64| {
             let e = stone.normal_equations(&origin, bias_m, Moving::WithField);
             e.constant + e.vector.dot(x) - 0.5 * x.dot(&(e.information * x))
         };
-        for (other, bias_m) in [(x, 3e-4), (Vector9::zeros(), 1e-3)] {
+        for (other, bias_m) in [(x, 3e-4), (Vector6::zeros(), 1e-3)] {
             let difference = value(&x, 1e-3) - value(&other, bias_m);
             let expected = density(&x, 1e-3) - density(&other, bias_m);
             assert!(

@@ -2,9 +2,9 @@
 
 use super::poses::{PoseProblem, PoseStone, Poses};
 use crate::registration::adjustment::observation::normal_equations::NormalEquations;
-use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector};
+use crate::registration::adjustment::stone_vector::StoneVector;
 use crate::registration::photos::turn_by_rotation;
-use nalgebra::{RowSVector, RowVector3};
+use nalgebra::{Matrix6, RowVector3, RowVector6};
 
 /// Ratio of the bias of a turn to (bias of the shift / radius of the face). Parts of a face that are biased
 /// independently of each other would make it one; changes on a stone are correlated over longer distances. With
@@ -70,8 +70,8 @@ impl PoseProblem<'_> {
 }
 
 impl StoneTurn {
-    fn lever(&self) -> RowSVector<f64, 9> {
-        let mut lever = RowSVector::<f64, 9>::zeros();
+    fn lever(&self) -> RowVector6<f64> {
+        let mut lever = RowVector6::zeros();
         lever.fixed_view_mut::<1, 3>(0, 3).copy_from(&self.by_rotation);
         lever
     }
@@ -108,7 +108,7 @@ impl StoneTurn {
         bias_sd_m: f64,
         weight: f64,
         expected: &StoneVector,
-        covariance: &Matrix9,
+        covariance: &Matrix6<f64>,
     ) -> f64 {
         let lever = self.lever();
         let shown = self.angle - (lever * expected.unknowns()).x;

@@ -5,12 +5,12 @@
 //! surface. [`super::correlation`] measures by how much.
 
 use crate::registration::adjustment::observation::normal_equations::NormalEquations;
-use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix3, Vector3};
 
 /// Unknowns in the face: two translations and the rotation about the normal.
 const INSIDE: [usize; 3] = [0, 1, 5];
 /// The others.
-const ACROSS: [usize; 6] = [2, 3, 4, 6, 7, 8];
+const ACROSS: [usize; 3] = [2, 3, 4];
 /// Relative ridge on every unknown: keeps those that no point determines solvable; far below any information
 /// that counts, as blocks are scaled to a unit diagonal and double precision has 16 digits.
 const RIDGE: f64 = 1e-12;
@@ -54,10 +54,10 @@ pub(crate) fn with_shift_error(mut equations: NormalEquations, error_m: f64) -> 
 /// The discounted equations, and the log determinant of the covariance with the error over that without.
 fn with_log_det(mut equations: NormalEquations, factor: f64, error_m: f64) -> (NormalEquations, f64) {
     let a = Matrix3::from_fn(|r, c| equations.information[(INSIDE[r], INSIDE[c])]);
-    let b = Matrix3x6::from_fn(|r, c| equations.information[(INSIDE[r], ACROSS[c])]);
-    let d = Matrix6::from_fn(|r, c| equations.information[(ACROSS[r], ACROSS[c])]);
+    let b = Matrix3::from_fn(|r, c| equations.information[(INSIDE[r], ACROSS[c])]);
+    let d = Matrix3::from_fn(|r, c| equations.information[(ACROSS[r], ACROSS[c])]);
     let of_inside = Vector3::from_fn(|r, _| equations.vector[INSIDE[r]]);
-    let of_across = Vector6::from_fn(|r, _| equations.vector[ACROSS[r]]);
+    let of_across = Vector3::from_fn(|r, _| equations.vector[ACROSS[r]]);
     let Some(inverse) = inverted(d) else {
         return (equations, 0.0);
     };
@@ -106,33 +106,33 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
+    use nalgebra::{Matrix6, Vector6};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn a_face_without_any_slope_says_nothing_of_a_motion_in_it() {
         // Ground in coordinates rounded to a centimetre: all heights are equal.
-        let mut information = Matrix9::zeros();
+        let mut information = Matrix6::zeros();
         ACROSS.iter().for_each(|&k| information[(k, k)] = 1e6);
         let mut flat = NormalEquations::nothing();
         flat.information = information;
         let found = discounted(flat, 3.0, 1e-3);
         assert_eq!(found.information, information);
         assert!(
-            found.constant == 0.0 && found.vector == Vector9::zeros(),
+            found.constant == 0.0 && found.vector == Vector6::zeros(),
             "{found:?}"
         );
     }
 
     fn term(columns: usize) -> NormalEquations {
         let mut rng = ChaCha8Rng::seed_from_u64(9);
-        let mut information = Matrix9::zeros();
+        let mut information = Matrix6::zeros();
         for _ in 0..columns {
-            let row = Vector9::from_fn(|k, _| rng.random_range(-1.0..1.0) * if k < 3 { 1e3 } else { 50.0 });
+            let row = Vector6::from_fn(|k, _| rng.random_range(-1.0..1.0) * if k < 3 { 1e3 } else { 50.0 });
             information += row * row.transpose();
         }
-        let optimum = Vector9::from_fn(|_, _| rng.random_range(-1.0..1.0));
+        let optimum = Vector6::from_fn(|_, _| rng.random_range(-1.0..1.0));
         NormalEquations {
             vector: information * optimum,
             information,
@@ -154,7 +154,7 @@ mod tests {
         assert!((d * after.vector - optimum).norm() < 1e-6);
         let peak = |t: &NormalEquations| t.constant + 0.5 * optimum.dot(&t.vector);
         assert!((peak(&after) - peak(&before)).abs() < 1e-6 * peak(&before).abs());
-        let given = |t: &NormalEquations| Matrix6::from_fn(|r, c| t.information[(ACROSS[r], ACROSS[c])]);
+        let given = |t: &NormalEquations| Matrix3::from_fn(|r, c| t.information[(ACROSS[r], ACROSS[c])]);
         assert_eq!(given(&after), given(&before));
     }
 

@@ -14,7 +14,8 @@ use super::robust::{robust_fit, steepness};
 use super::slope_scatter::SlopeScatter;
 use super::surface_noise::SurfaceNoise;
 use crate::linalg::{BandInverse, add_scaled};
-use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
+use crate::registration::adjustment::stone_vector::StoneVector;
+use nalgebra::{Matrix6, Vector6};
 use pulp::{Arch, Simd, WithSimd};
 
 /// The normal equations of a stone's points at one of its motions, and figures of how well both epochs agree
@@ -22,9 +23,9 @@ use pulp::{Arch, Simd, WithSimd};
 #[derive(Clone, Debug)]
 pub(crate) struct Equations {
     /// Information matrix.
-    pub information: Matrix9,
+    pub information: Matrix6<f64>,
     /// Gradient of half the squared residuals; the step solves `information * step = -gradient`.
-    pub gradient: Vector9,
+    pub gradient: Vector6<f64>,
     /// Minus twice the log likelihood of the points, one per point taken off; points outside count nothing.
     pub deviance: f64,
     /// Share of the small cells of the larger face that hold points of both epochs.
@@ -51,8 +52,8 @@ impl Equations {
     /// The equations of no points; `overlap` as in the struct.
     pub(super) fn zeros(overlap: f64) -> Self {
         Self {
-            information: Matrix9::zeros(),
-            gradient: Vector9::zeros(),
+            information: Matrix6::zeros(),
+            gradient: Vector6::zeros(),
             deviance: 0.0,
             overlap,
             differences: Vec::new(),
@@ -168,7 +169,7 @@ impl Setting<'_> {
         };
         sum.weights.store(&epochs);
         let shares = Shares::new(&grid, &epochs, noise);
-        let mut coupling = vec![[0.0; 9]; grid.coefficient_count()];
+        let mut coupling = vec![[0.0; 6]; grid.coefficient_count()];
         let mut cells = PatchCells::new(&grid, self.layout.cell_m);
         let inverse = (!self.is_rough).then(|| fit.factor.inverse());
         let squares = [0, 1].map(|epoch| {
@@ -191,7 +192,7 @@ impl Setting<'_> {
     }
 
     #[inline(always)]
-    fn jacobian(&self, point: &WeightedPoint, slopes: [f64; 2]) -> [f64; 9] {
+    fn jacobian(&self, point: &WeightedPoint, slopes: [f64; 2]) -> [f64; 6] {
         self.motion.jacobian(self.still, &point.position, slopes)
     }
 }
@@ -206,7 +207,7 @@ struct EpochPoints<'a> {
     /// Inverse of the fit's factor; `None` in a rough evaluation.
     inverse: Option<&'a BandInverse>,
     shares: &'a Shares,
-    coupling: &'a mut [[f64; 9]],
+    coupling: &'a mut [[f64; 6]],
     cells: &'a mut PatchCells,
     sum: &'a mut Equations,
 }
@@ -260,22 +261,13 @@ impl WithSimd for EpochPoints<'_> {
 /// Adds `weight * row' * row` to the lower triangle of a matrix; what is above the diagonal is set by
 /// [`take_off_surface`].
 #[inline(always)]
-fn add_square<S: Simd>(matrix: &mut Matrix9, weight: f64, row: &[f64; 9]) {
-    // Whole vectors of four or eight, which start at the diagonal or a little above it.
+fn add_square<S: Simd>(matrix: &mut Matrix6<f64>, weight: f64, row: &[f64; 6]) {
     for (c, (column, value)) in matrix.data.0.iter_mut().zip(row).enumerate() {
-        match c {
-            0 => add_scaled::<S, _>(column, weight * value, row),
-            1..5 => add_tail::<S, 8>(column, weight * value, row),
-            _ => add_tail::<S, 4>(column, weight * value, row),
+        // From the third column on, the last four entries hold all that is below the diagonal.
+        match (column.last_chunk_mut::<4>(), row.last_chunk()) {
+            (Some(tail), Some(values)) if c > 1 => add_scaled::<S, _>(tail, weight * value, values),
+            _ => add_scaled::<S, _>(column, weight * value, row),
         }
-    }
-}
-
-/// Adds `factor * row` to the last N entries of a column.
-#[inline(always)]
-fn add_tail<S: Simd, const N: usize>(column: &mut [f64; 9], factor: f64, row: &[f64; 9]) {
-    if let (Some(tail), Some(values)) = (column.last_chunk_mut::<N>(), row.last_chunk()) {
-        add_scaled::<S, _>(tail, factor, values);
     }
 }
 
@@ -334,10 +326,10 @@ impl WithSimd for WeightSums<'_> {
 }
 
 /// The surface is unknown: what it absorbs is taken off the information (Schur complement).
-fn take_off_surface(fit: &PatchFit, mut coupling: Vec<[f64; 9]>, information: &mut Matrix9) {
+fn take_off_surface(fit: &PatchFit, mut coupling: Vec<[f64; 6]>, information: &mut Matrix6<f64>) {
     fit.factor.forward(&mut coupling);
     for row in &coupling {
-        let c = Vector9::from(*row);
+        let c = Vector6::from(*row);
         information.syger(-1.0, &c, &c, 1.0);
     }
     information.fill_upper_triangle_with_lower_triangle();
@@ -448,7 +440,7 @@ mod tests {
             for k in 0..6 {
                 let step = 1e-3 * here.information[(k, k)].sqrt().recip();
                 let moved = |by: f64| {
-                    let mut x = Vector9::zeros();
+                    let mut x = Vector6::zeros();
                     x[k] = by * step;
                     at(&x.into()).deviance
                 };
@@ -551,11 +543,11 @@ mod tests {
     #[test]
     fn the_lower_triangle_gets_the_square_of_a_row() {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let start = Matrix9::from_fn(|_, _| rng.random_range(-1.0..1.0));
-        let row: [f64; 9] = from_fn(|_| rng.random_range(-1.0..1.0));
+        let start = Matrix6::from_fn(|_, _| rng.random_range(-1.0..1.0));
+        let row: [f64; 6] = from_fn(|_| rng.random_range(-1.0..1.0));
         let mut matrix = start;
         add_square::<Scalar>(&mut matrix, 0.3, &row);
-        for r in 0..9 {
+        for r in 0..6 {
             for c in 0..=r {
                 assert!((matrix[(r, c)] - start[(r, c)] - 0.3 * row[r] * row[c]).abs() < 1e-15);
             }

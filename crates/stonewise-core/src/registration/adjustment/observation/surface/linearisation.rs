@@ -96,15 +96,14 @@ impl Linearisation {
 mod tests {
     use super::*;
     use crate::registration::adjustment::observation::surface::testing::without_points;
-    use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
-    use nalgebra::Vector3;
+    use nalgebra::{Matrix6, Vector3, Vector6};
 
     fn at(x: f64) -> StoneVector {
         StoneVector::from_translation(Vector3::new(x, 0.0, 0.0))
     }
 
     /// Equations whose log likelihood is -(x - optimum)' H (x - optimum) / 2 - 1, evaluated at `motion`.
-    fn quadratic(motion: &StoneVector, optimum: &Vector9, information: Matrix9) -> Equations {
+    fn quadratic(motion: &StoneVector, optimum: &Vector6<f64>, information: Matrix6<f64>) -> Equations {
         let apart = motion.unknowns() - optimum;
         Equations {
             information,
@@ -116,9 +115,9 @@ mod tests {
 
     #[test]
     fn a_quadratic_is_the_same_about_any_origin() {
-        let m = Matrix9::from_fn(|r, c| ((r * 7 + c * 3) % 5) as f64 - 2.0);
-        let information = m * m.transpose() + Matrix9::identity() * 10.0;
-        let optimum = Vector9::from_fn(|k, _| 0.1 * k as f64 - 0.3);
+        let m = Matrix6::from_fn(|r, c| ((r * 7 + c * 3) % 5) as f64 - 2.0);
+        let information = m * m.transpose() + Matrix6::identity() * 10.0;
+        let optimum = Vector6::from_fn(|k, _| 0.1 * k as f64 - 0.3);
         let motion = at(0.2);
         let mut linear = Linearisation::new(motion);
         linear.set(motion, quadratic(&motion, &optimum, information));
@@ -137,7 +136,7 @@ mod tests {
         assert!(linear.is_due(&at(0.0), 1e-3));
         linear.set(at(0.0), without_points());
         assert!(!linear.is_due(&at(0.9e-3), 1e-3) && linear.is_due(&at(1.1e-3), 1e-3));
-        let turned = StoneVector::from(Vector9::from_fn(|k, _| if k == 4 { 6e-3 } else { 0.0 }));
+        let turned = StoneVector::from(Vector6::from_fn(|k, _| if k == 4 { 6e-3 } else { 0.0 }));
         assert!(linear.is_due(&turned, 1e-3));
         linear.invalidate();
         assert!(linear.is_due(&at(0.0), 1e-3) && linear.equations().is_none());

@@ -7,7 +7,6 @@ use nalgebra::{Rotation3, Vector3};
 pub(crate) struct LocalMotion {
     translation: Vector3<f64>,
     rotation: Rotation3<f64>,
-    bending: [f64; 3],
 }
 
 /// The epoch whose points stay where they are, while those of the other are moved onto its surface.
@@ -22,83 +21,52 @@ impl LocalMotion {
         Self {
             translation: motion.translation(),
             rotation: Rotation3::new(motion.rotation()),
-            bending: motion.bending().into(),
         }
     }
 
     /// Where a point of the first epoch is in the second.
     pub fn apply(&self, p: &[f64; 3]) -> [f64; 3] {
-        let bent = Vector3::new(p[0], p[1], p[2] + self.bend(p[0], p[1]));
-        (self.rotation * bent + self.translation).into()
+        (self.rotation * Vector3::from(*p) + self.translation).into()
     }
 
     /// Where a point of the second epoch was in the first.
     pub fn undo(&self, q: &[f64; 3]) -> [f64; 3] {
-        let y = self
-            .rotation
-            .inverse_transform_vector(&(Vector3::from(*q) - self.translation));
-        [y.x, y.y, y.z - self.bend(y.x, y.y)]
-    }
-
-    /// Height that bending adds.
-    fn bend(&self, u: f64, v: f64) -> f64 {
-        let [uu, uv, vv] = self.bending;
-        0.5 * (uu * u * u + 2.0 * uv * u * v + vv * v * v)
+        self.rotation
+            .inverse_transform_vector(&(Vector3::from(*q) - self.translation))
+            .into()
     }
 
     /// Derivative, with respect to the motion, of the residual of a point of the second epoch moved back, or of the
     /// negative residual of one of the first epoch moved onto the second. The point is now at `p`, where the surface
     /// has these slopes.
     #[inline(always)]
-    pub fn jacobian(&self, still: Still, p: &[f64; 3], slopes: [f64; 2]) -> [f64; 9] {
+    pub fn jacobian(&self, still: Still, p: &[f64; 3], slopes: [f64; 2]) -> [f64; 6] {
         let upright = Vector3::new(-slopes[0], -slopes[1], 1.0);
-        let [uu, uv, vv] = self.bending;
-        // Normal of the surface and arm of the point, turned as in the second epoch; where bending acts, and how much
-        // of it is along the normal.
-        let (m, arm, [u, v], along) = match still {
-            Still::First => {
-                let [u, v, _] = *p;
-                let bent = Vector3::new(uu * u + uv * v, uv * u + vv * v, 0.0);
-                let arm = self.rotation * Vector3::from(*p);
-                (self.rotation * (upright - bent), arm, [u, v], 1.0)
-            }
-            Still::Second => {
-                let arm = Vector3::from(*p) - self.translation;
-                let y = self.rotation.inverse_transform_vector(&arm);
-                let out = self.rotation * Vector3::z();
-                (upright, arm, [y.x, y.y], upright.dot(&out))
-            }
+        // Normal of the surface and arm of the point, turned as in the second epoch.
+        let (m, arm) = match still {
+            Still::First => (self.rotation * upright, self.rotation * Vector3::from(*p)),
+            Still::Second => (upright, Vector3::from(*p) - self.translation),
         };
         let r = m.cross(&arm);
-        [
-            -m.x,
-            -m.y,
-            -m.z,
-            r.x,
-            r.y,
-            r.z,
-            -along * u * u / 2.0,
-            -along * u * v,
-            -along * v * v / 2.0,
-        ]
+        [-m.x, -m.y, -m.z, r.x, r.y, r.z]
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::registration::adjustment::stone_vector::Vector9;
+    use nalgebra::Vector6;
 
-    const AT: [f64; 9] = [0.01, -0.02, 0.03, 0.04, -0.05, 0.06, 0.2, -0.1, 0.3];
+    const AT: [f64; 6] = [0.01, -0.02, 0.03, 0.04, -0.05, 0.06];
     const POINT: [f64; 3] = [0.11, -0.07, 0.05];
 
-    fn motion(unknowns: &Vector9) -> LocalMotion {
+    fn motion(unknowns: &Vector6<f64>) -> LocalMotion {
         LocalMotion::new(&StoneVector::from(*unknowns))
     }
 
     #[test]
     fn undoing_a_motion_brings_a_point_back() {
-        let motion = motion(&Vector9::from(AT));
+        let motion = motion(&Vector6::from(AT));
         let back = motion.undo(&motion.apply(&POINT));
         let apart = Vector3::from(back) - Vector3::from(POINT);
         assert!(apart.norm() < 1e-15, "{apart}");
@@ -110,9 +78,9 @@ mod tests {
         // everywhere.
         let slopes = [0.3, -0.2];
         let above = |[u, v, z]: [f64; 3]| z - slopes[0] * u - slopes[1] * v;
-        let at = Vector9::from(AT);
+        let at = Vector6::from(AT);
         for still in [Still::First, Still::Second] {
-            let residual = |unknowns: &Vector9| match still {
+            let residual = |unknowns: &Vector6<f64>| match still {
                 Still::First => above(motion(unknowns).undo(&POINT)),
                 Still::Second => -above(motion(unknowns).apply(&POINT)),
             };
@@ -121,7 +89,7 @@ mod tests {
                 Still::Second => motion(&at).apply(&POINT),
             };
             let row = motion(&at).jacobian(still, &now, slopes);
-            for k in 0..9 {
+            for k in 0..6 {
                 let step = 1e-6;
                 let moved = |by: f64| {
                     let mut unknowns = at;

@@ -125,17 +125,17 @@ impl SurfaceModel {
     }
 
     /// Variances of errors that all points of a stone share, beyond what its own cells show: translation,
-    /// rotation, bending.
+    /// rotation.
     ///
     /// `octaves` of length, from the size of a stone up, over which they add; `systematic_share`: of a
     /// point's noise that no number of points averages away.
-    pub fn shared_variances(&self, stones: &[&Equations], octaves: f64, systematic_share: f64) -> [f64; 9] {
+    pub fn shared_variances(&self, stones: &[&Equations], octaves: f64, systematic_share: f64) -> [f64; 6] {
         let shared = shared_variance(stones, &self.correlation);
         let noise = self.noise.sigma_m;
         let bias = systematic_share.powi(2) * 0.5 * (noise[0].powi(2) + noise[1].powi(2));
         let turn = shared / (HALF_STONE_M * HALF_STONE_M);
         let shift = octaves * shared;
-        [shift, shift, shift + bias, turn, turn, turn, 0.0, 0.0, 0.0]
+        [shift, shift, shift + bias, turn, turn, turn]
     }
 }
 

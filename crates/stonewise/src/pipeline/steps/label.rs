@@ -1,7 +1,5 @@
 //! An epoch's points with the stone of each.
 
-mod disk_labels;
-
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
@@ -12,12 +10,15 @@ use crate::pipeline::steps::segment::{SEGMENT, Segmented};
 use crate::pipeline::steps::views::has_no_photos;
 use crate::pipeline::until::Until;
 use crate::project::Project;
+use crate::storage::epoch_tiles::{EpochTiles, KnownMotion};
+use crate::storage::labels::DiskLabels;
 use crate::storage::step::{Key, StepDir};
-pub use disk_labels::DiskLabels;
+use nalgebra::Point3;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::epoch::EpochId;
+use stonewise_core::geometry::Rigid3;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
 use stonewise_core::registration::StoneExtents;
@@ -91,6 +92,36 @@ impl Run<'_> {
             transfer: read_json(&step.file(TRANSFER))?,
             store: DiskLabels::new(step.path(), &self.ingested(epoch)?.tiles.surveyed),
             step,
+        })
+    }
+
+    /// The points of an epoch with the motion that the project prescribes. A stone moves as a whole, by the field at its
+    /// centroid in the reference.
+    fn moved(&self, epoch: EpochId) -> Result<Arc<Ingested>> {
+        let placed = self.placed(epoch)?;
+        let Some(KnownMotion { field, .. }) = &placed.tiles.motion else {
+            return Ok(placed);
+        };
+        self.known(&format!("moved-{epoch}"), || {
+            let frame = self.frame(epoch)?.unwrap_or_else(Rigid3::identity);
+            let reference = self.found_in_own_frame(EpochId::REFERENCE)?;
+            let displacement = |stone: &Stone| {
+                let centroid = frame * stone.centroid;
+                let apart = |c: &&Point3<f64>| (*c - centroid).norm_squared();
+                let places = reference.iter().map(|s| &s.centroid);
+                let nearest = places.min_by(|a, b| apart(a).total_cmp(&apart(b)));
+                (stone.id.0, field.displacement_at(nearest.unwrap_or(&centroid)))
+            };
+            let displacements = self.found_in_own_frame(epoch)?.iter().map(displacement).collect();
+            let (surveyed, labels) = (placed.tiles.surveyed.clone(), self.votes(epoch)?.store);
+            let motion = KnownMotion::of_stones(field.clone(), labels, displacements, &surveyed)?;
+            Ok(Ingested {
+                step: placed.step.clone(),
+                tiles: EpochTiles {
+                    surveyed,
+                    motion: Some(motion),
+                },
+            })
         })
     }
 
@@ -195,18 +226,21 @@ pub(super) struct Labels {
 
 /// Tabulates the stones of an epoch in a step of this name; then moves the points, where the project says so.
 pub(super) fn tabulate(run: &Run, epoch: EpochId, name: &str, labels: Labels) -> Result<Labelled> {
-    let (context, ingested, photos) = (run.context, run.placed(epoch)?, run.posed(epoch)?);
+    let (context, ingested, photos) = (run.context, run.moved(epoch)?, run.posed(epoch)?);
     let Labels {
         transfer,
         store,
         step: labelled,
     } = labels;
     let params = &context.project.settings.stones;
-    let key = Key::new(
-        "stones",
-        &(params, &ingested.tiles.motion, run.frame(epoch)?),
-        &[labelled.key().as_str()],
-    );
+    // A prescribed motion moves stones by where they are in the reference.
+    let motion = context.project.epochs[epoch].motion.as_ref();
+    let reference = motion.map(|_| run.voted(EpochId::REFERENCE)).transpose()?;
+    let above = [
+        labelled.key().as_str(),
+        reference.as_ref().map_or("", |r| r.key().as_str()),
+    ];
+    let key = Key::new("stones", &(params, motion, run.frame(epoch)?), &above);
     let step = context.step(&format!("{name}-{epoch}"), key, |step, _| {
         let stones = build_stones(
             &ingested.tiles,
