@@ -13,6 +13,7 @@ from typing import Any, Optional, Union
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute
 import pyarrow.parquet
 from numpy.typing import NDArray
 
@@ -93,6 +94,18 @@ class Pair:
         """(n, 3, 3) m^2 of :attr:`displacement`; NaN where a stone was not measured. Where the datum is unknown, of the motion against the
         common rigid motion of the measured stones."""
         return _tables.covariance(self.stones_arrow)
+
+    def budget(self, stone_id: int) -> dict[str, NDArray[np.float64]]:
+        """Where the standard deviation of a stone's motion comes from: for each term its share along the wall, up and out, metres. Their
+        squares add up to those of ``sd_along``, ``sd_up`` and ``sd_out``. Empty where the stone was not measured.
+
+        :raises Error: There is no such stone.
+        """
+        stones = self.stones_arrow
+        rows = stones.filter(pa.compute.equal(stones["stone_id"], stone_id)).to_pylist()
+        if not rows:
+            raise Error(f"no stone {stone_id} in {self._file('stones', 'parquet')}")
+        return {t["term"]: np.array([t["sd_along"], t["sd_up"], t["sd_out"]]) for t in rows[0]["budget"]}
 
     @property
     def joints(self) -> Any:

@@ -65,6 +65,9 @@ pub struct StoneMotion {
     /// Covariance of (displacement, rotation), absolute, m^2, m rad, rad^2; without registration error of the
     /// epochs.
     pub covariance: Matrix6<f64>,
+    /// Parts of the covariance of the displacement that stones share.
+    #[serde(default)]
+    pub shared: SharedParts,
     /// Displacement against what the neighbours predict, metres.
     pub relative: Vector3<f64>,
     /// Covariance of `relative`, m^2.
@@ -79,6 +82,16 @@ pub struct StoneMotion {
     pub observability: f64,
     /// RMS of the final residuals along the normal, metres.
     pub rmse_m: f64,
+}
+
+/// Parts of the covariance of a displacement, world, m^2; the rest is what the stone's own observations and its neighbours
+/// leave open.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SharedParts {
+    /// By errors that the points of stones share over some length.
+    pub points: Matrix3<f64>,
+    /// By errors of the poses of photos.
+    pub poses: Matrix3<f64>,
 }
 
 /// Why a matched stone has no motion.

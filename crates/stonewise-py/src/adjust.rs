@@ -245,8 +245,8 @@ fn rows(
             MatchOutcome::Matched { second } => partners.get(second).copied(),
             MatchOutcome::Unmatched(_) => None,
         };
-        let relative = relative.get(&stone.id).copied().unwrap_or_default();
-        let reference = Reference::against(common.as_ref(), stone, &relative);
+        let relative = relative.get(&stone.id).map(|r| (Term::Registration, *r));
+        let reference = Reference::against(common.as_ref(), stone, relative.into_iter().collect());
         let pair = motions.get(&stone.id).copied();
         Some(StoneRow::new(
             stone,

@@ -1,6 +1,7 @@
 //! The result files of a run as types: stones and their columns, outlines, the unrolled wall, joints,
 //! evidence, records.
 
+mod budget;
 pub mod calendar;
 mod change_points;
 mod columns;
@@ -29,6 +30,7 @@ mod zone_place;
 #[cfg(test)]
 extern crate self as stonewise_results;
 
+pub use budget::{Budget, Term};
 pub use change_points::DistancePoint;
 pub use columns::column;
 pub use columns::{STONE_COLUMNS, StoneColumn};

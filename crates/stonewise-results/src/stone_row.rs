@@ -1,11 +1,14 @@
 //! One row of the stone table.
 
+use crate::budget::{Budget, Term};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use std::fmt;
 use std::str::FromStr;
 use stonewise_core::geometry::{FaceFrame, SmallMotion};
 use stonewise_core::registration::StoneDeformation;
-use stonewise_core::stone::{MatchOutcome, MotionFailure, PairResult, Stone, StoneMotion, UnmatchedReason};
+use stonewise_core::stone::{
+    MatchOutcome, MotionFailure, PairResult, SharedParts, Stone, StoneMotion, UnmatchedReason,
+};
 
 /// 95 % quantile of chi-square with 3 degrees of freedom.
 const CHI2_3_95: f64 = 7.814_727_903_251_179;
@@ -82,11 +85,13 @@ pub struct RowMotion {
     pub deformation_sd: [Option<f64>; 3],
     /// Smallest observability, 0 to 1.
     pub observability: f64,
+    /// Where `face_sd` comes from.
+    pub budget: Budget,
 }
 
 /// The registration error subtracted from a stone's motion, and the reference motion that the result is
 /// tested against.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reference {
     /// Estimated error of the later epoch at the stone, metres, world: taken off the displacement.
     pub error: Vector3<f64>,
@@ -95,21 +100,29 @@ pub struct Reference {
     /// Motion of the reference at the stone, metres, world: zero where the registration of the epochs is
     /// known, else the common rigid motion of the measured stones.
     pub motion: Vector3<f64>,
-    /// Covariance that the reference adds to the stone's own, m^2: error of the registration, or of the
-    /// common motion.
-    pub covariance: Matrix3<f64>,
+    /// Covariances that the reference adds to the stone's own, world, m^2.
+    pub terms: Vec<(Term, Matrix3<f64>)>,
     /// Covariance that the reference adds to the rotation of the stone, rad^2.
     pub rotation_covariance: Matrix3<f64>,
 }
 
 impl Reference {
+    /// Covariance that the reference adds to the stone's own, world, m^2.
+    fn covariance(&self) -> Matrix3<f64> {
+        self.terms.iter().map(|(_, covariance)| covariance).sum()
+    }
+
     /// The common motion at a stone with the error of its estimate: what a stone is tested against where
-    /// nothing is known about the registration. `relative`: covariance of the non-rigid part of the
+    /// nothing is known about the registration. `relative`: covariances of the non-rigid part of the
     /// registration error at the stone, m^2.
-    pub fn against(common: Option<&SmallMotion>, stone: &Stone, relative: &Matrix3<f64>) -> Self {
+    pub fn against(common: Option<&SmallMotion>, stone: &Stone, relative: Vec<(Term, Matrix3<f64>)>) -> Self {
         common.map_or_else(Self::default, |common| Self {
             motion: common.at(&stone.centroid),
-            covariance: common.covariance_at(&stone.centroid) + relative,
+            terms: [
+                vec![(Term::CommonMotion, common.covariance_at(&stone.centroid))],
+                relative,
+            ]
+            .concat(),
             rotation_covariance: common.covariance.fixed_view::<3, 3>(3, 3).into_owned(),
             ..Self::default()
         })
@@ -286,10 +299,18 @@ impl RowMotion {
     }
 
     fn new(motion: &StoneMotion, normal: &Vector3<f64>, reference: &Reference) -> Self {
+        let covariance = motion.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+        let SharedParts { points, poses } = motion.shared;
+        let terms = [
+            (Term::Stone, covariance - points - poses),
+            (Term::Points, points),
+            (Term::Poses, poses),
+        ];
         let measured = Self {
             displacement: motion.displacement,
             rotation: motion.rotation,
-            covariance: motion.covariance.fixed_view::<3, 3>(0, 0).into_owned(),
+            covariance,
+            budget: Budget::of(normal, &terms),
             rotation_covariance: motion.covariance.fixed_view::<3, 3>(3, 3).into_owned(),
             relative: motion.relative,
             relative_covariance: symmetric(&motion.relative_covariance),
@@ -304,7 +325,7 @@ impl RowMotion {
     /// The motion with the error of a reference taken off, whose covariance is added.
     #[must_use]
     pub fn against(&self, normal: &Vector3<f64>, reference: &Reference) -> Self {
-        let covariance = self.covariance + reference.covariance;
+        let covariance = self.covariance + reference.covariance();
         let displacement = self.displacement - reference.error;
         let tested = displacement - reference.motion;
         let detection_limit_m = detection_limit_m(&tested, &covariance);
@@ -319,6 +340,7 @@ impl RowMotion {
             rotation_covariance: symmetric(&(self.rotation_covariance + reference.rotation_covariance)),
             detection_limit_m,
             significant: tested.norm() > detection_limit_m,
+            budget: self.budget.with(&Budget::of(normal, &reference.terms)),
             ..self.clone()
         }
     }
@@ -391,6 +413,10 @@ mod tests {
             displacement,
             rotation: Vector3::zeros(),
             covariance: Matrix6::identity() * (sigma * sigma),
+            shared: SharedParts {
+                points: Matrix3::from_diagonal(&Vector3::new(1e-6, 2e-6, 3e-6)),
+                poses: Matrix3::identity() * 5e-7,
+            },
             relative: Vector3::zeros(),
             own_motion_p: 1.0,
             relative_covariance: Matrix3::identity(),
@@ -412,7 +438,7 @@ mod tests {
         let pair = pair(Vector3::new(0.03, 0.01, -0.02), 0.003);
         let outcome = MatchOutcome::Matched { second: StoneId(9) };
         let reference = Reference {
-            covariance: Matrix3::identity() * (0.004 * 0.004),
+            terms: vec![(Term::Registration, Matrix3::identity() * (0.004 * 0.004))],
             ..Reference::default()
         };
         let place = Point2::new(3.0, 1.5);
@@ -434,6 +460,11 @@ mod tests {
         assert!((motion.face - Vector3::new(0.01, -0.02, 0.03)).norm() < 1e-12);
         assert!((motion.covariance - Matrix3::identity() * (0.005 * 0.005)).norm() < 1e-12);
         assert!((motion.face_sd - Vector3::repeat(0.005)).norm() < 1e-12);
+        // Along, up and out are y, z and x.
+        let variances = |term| motion.budget.variances(term);
+        assert!((variances(Term::Points) - Vector3::new(2e-6, 3e-6, 1e-6)).norm() < 1e-18);
+        assert!((variances(Term::Registration) - Vector3::repeat(16e-6)).norm() < 1e-18);
+        assert!((motion.budget.total() - motion.face_sd.map(|sd| sd * sd)).norm() < 1e-18);
         // Equal in all directions: sqrt(7.8147) sigma.
         assert!((motion.detection_limit_m - 0.005 * 2.795_483).abs() < 1e-8);
         assert!(motion.significant);
@@ -447,7 +478,7 @@ mod tests {
         let reference = Reference {
             error,
             turn,
-            covariance: Matrix3::identity() * 16e-6,
+            terms: vec![(Term::Registration, Matrix3::identity() * 16e-6)],
             rotation_covariance: Matrix3::from_diagonal(&Vector3::new(1e-8, 4e-8, 9e-8)),
             ..Reference::default()
         };

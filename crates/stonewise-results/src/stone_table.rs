@@ -2,10 +2,13 @@
 
 use super::columns::{RARE_COLUMNS, STONE_COLUMNS, columns_of};
 use super::names::{DATA_DIR, PairFile};
-use super::{RowMotion, StoneRow};
+use super::{Budget, RowMotion, StoneRow};
+use nalgebra::Vector3;
 use std::path::Path;
-use stonewise_base::error::Result;
-use stonewise_io::table::{Table, TableError, read_parquet, write_csv_described_in, write_parquet};
+use stonewise_base::error::{Error, Result};
+use stonewise_io::table::{
+    Lists, Table, TableError, read_lists, read_parquet, write_csv_described_in, write_parquet_with,
+};
 
 /// Writes the stones of a pair of epochs into `dir`: `stones.csv` with
 /// `data/stones.csv-metadata.json`, and `data/stones.parquet`; of the third epoch `data/stones_2.csv` and so on.
@@ -14,8 +17,40 @@ use stonewise_io::table::{Table, TableError, read_parquet, write_csv_described_i
 /// A file cannot be written.
 pub fn write_stones(dir: &Path, pair: usize, rows: &[StoneRow]) -> Result<()> {
     let table = stone_table(rows)?;
-    write_parquet(&dir.join(PairFile::StonesParquet.place(pair)), &table)?;
+    write_parquet_with(
+        &dir.join(PairFile::StonesParquet.place(pair)),
+        &table,
+        &budget_column(rows),
+    )?;
     write_stones_csv(dir, pair, &table)
+}
+
+/// Column of the budgets, which only Parquet files have.
+const BUDGET: &str = "budget";
+
+fn budget_column(rows: &[StoneRow]) -> Lists {
+    let of_row = |row: &StoneRow| {
+        let sds = row.motion.iter().flat_map(|motion| motion.budget.sds());
+        sds.map(|(term, sd)| (term.name().to_owned(), sd.as_slice().to_vec()))
+            .collect()
+    };
+    Lists {
+        name: BUDGET.to_owned(),
+        text: "term".to_owned(),
+        numbers: ["sd_along", "sd_up", "sd_out"].map(str::to_owned).to_vec(),
+        rows: rows.iter().map(of_row).collect(),
+    }
+}
+
+/// The budget of a row from its list.
+fn budget_of(items: &[(String, Vec<f64>)]) -> std::result::Result<Budget, String> {
+    let sds = items.iter().map(|(term, sd)| match sd[..] {
+        [along, up, out] => Ok((term.parse()?, Vector3::new(along, up, out))),
+        _ => Err(format!("{} numbers of {term:?} where 3 should be", sd.len())),
+    });
+    Ok(Budget::from_sds(
+        sds.collect::<std::result::Result<Vec<_>, String>>()?,
+    ))
 }
 
 /// Writes a stone table as text alone.
@@ -64,6 +99,12 @@ pub fn read_stones(path: &Path) -> Result<Vec<StoneRow>> {
             column.fill(&mut rows, &table, path)?;
         }
     }
+    let budgets = read_lists(path, BUDGET)?.map_or_else(Vec::new, |lists| lists.rows);
+    for (row, items) in rows.iter_mut().zip(&budgets) {
+        if let Some(motion) = &mut row.motion {
+            motion.budget = budget_of(items).map_err(|reason| Error::results(path, reason))?;
+        }
+    }
     rows.iter_mut()
         .filter_map(|r| r.motion.as_mut())
         .for_each(RowMotion::mirror);
@@ -86,6 +127,7 @@ pub fn stone_table(rows: &[StoneRow]) -> std::result::Result<Table, TableError> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::Term;
     use crate::testing::rows;
 
     /// The sentences of the contract, copied word for word.
@@ -115,7 +157,14 @@ mod tests {
         let [mut edited, mut carried] = [rows(), rows()];
         edited[3].edited = Some(2);
         carried[1].carried_from = Some(1);
-        for rows in [rows(), Vec::new(), edited, carried] {
+        let mut budgeted = rows();
+        let sds = [
+            (Term::Stone, Vector3::new(0.5, 0.25, 2.0)),
+            (Term::CommonMotion, Vector3::repeat(4.0)),
+        ];
+        let measured = budgeted.iter_mut().filter_map(|row| row.motion.as_mut());
+        measured.for_each(|motion| motion.budget = Budget::from_sds(sds));
+        for rows in [rows(), Vec::new(), edited, carried, budgeted] {
             write_stones(folder.path(), 1, &rows).unwrap();
             assert_eq!(
                 read_stones(&folder.path().join("data/stones.parquet")).unwrap(),

@@ -16,7 +16,7 @@ use super::column::Values;
 use super::{Column, Table, TableError};
 use crate::wall::behind_wall;
 
-/// Reads all columns of a Parquet file.
+/// Reads all columns of a Parquet file but those of lists, which [`read_lists`](super::read_lists) reads.
 ///
 /// # Errors
 /// The file cannot be read, is no Parquet file, is damaged, or has a column of a type that a [`Table`] cannot
@@ -44,12 +44,12 @@ pub fn read_metadata(path: &Path) -> Result<(usize, Vec<(String, String)>), Tabl
     })
 }
 
-fn open(path: &Path) -> Result<SerializedFileReader<File>, TableError> {
+pub(super) fn open(path: &Path) -> Result<SerializedFileReader<File>, TableError> {
     let file = File::open(path).map_err(|e| unreadable(path, e))?;
     SerializedFileReader::new(file).map_err(|e| unreadable(path, e))
 }
 
-fn row_count(reader: &SerializedFileReader<File>) -> usize {
+pub(super) fn row_count(reader: &SerializedFileReader<File>) -> usize {
     usize::try_from(reader.metadata().file_metadata().num_rows()).unwrap_or(0)
 }
 
@@ -67,7 +67,9 @@ fn read_selected(path: &Path, names: Option<&[&str]>) -> Result<Table, TableErro
     let descriptors = reader.metadata().file_metadata().schema_descr().columns();
     let present: Vec<String> = descriptors.iter().map(|d| d.path().string()).collect();
     let selected = match names {
-        None => (0..present.len()).collect(),
+        None => (0..present.len())
+            .filter(|k| descriptors[*k].max_rep_level() == 0)
+            .collect(),
         Some(names) => positions(names, &present)?,
     };
     let mut table = Table::new();
@@ -187,11 +189,11 @@ fn unsupported(descriptor: &ColumnDescriptor) -> ParquetError {
 }
 
 /// Damaged files make the decoder panic in places; this turns that into an error.
-fn guarded<T>(path: &Path, read: impl FnOnce() -> Result<T, TableError>) -> Result<T, TableError> {
+pub(super) fn guarded<T>(path: &Path, read: impl FnOnce() -> Result<T, TableError>) -> Result<T, TableError> {
     behind_wall(read).unwrap_or_else(|| Err(unreadable(path, "the file is damaged")))
 }
 
-fn unreadable(path: &Path, reason: impl ToString) -> TableError {
+pub(super) fn unreadable(path: &Path, reason: impl ToString) -> TableError {
     TableError::Read {
         path: path.to_owned(),
         reason: reason.to_string(),

@@ -14,7 +14,7 @@ use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types::Type;
 
 use super::column::Values;
-use super::{Column, Table, TableError};
+use super::{Column, Lists, Table, TableError};
 use crate::atomic::write_atomically;
 
 /// Rows per row group: large enough to compress well, small enough for readers that take one at a time.
@@ -27,10 +27,22 @@ const ROWS_PER_GROUP: usize = 1 << 20;
 /// # Errors
 /// The file cannot be written; an earlier file is kept then.
 pub fn write_parquet(path: &Path, table: &Table) -> Result<(), TableError> {
+    write(path, table, None)
+}
+
+/// As [`write_parquet`], with a column of lists behind the others, one list for each row.
+///
+/// # Errors
+/// As [`write_parquet`].
+pub fn write_parquet_with(path: &Path, table: &Table, lists: &Lists) -> Result<(), TableError> {
+    write(path, table, Some(lists))
+}
+
+fn write(path: &Path, table: &Table, lists: Option<&Lists>) -> Result<(), TableError> {
     let written: Result<(), ParquetError> = write_atomically(path, |partial| {
         let file = File::create(partial)?;
         let mut writer =
-            SerializedFileWriter::new(file, Arc::new(schema(table)?), Arc::new(properties(table)))?;
+            SerializedFileWriter::new(file, Arc::new(schema(table, lists)?), Arc::new(properties(table)))?;
         for start in (0..table.rows()).step_by(ROWS_PER_GROUP) {
             let rows = start..table.rows().min(start + ROWS_PER_GROUP);
             let mut group = writer.next_row_group()?;
@@ -40,6 +52,9 @@ pub fn write_parquet(path: &Path, table: &Table) -> Result<(), TableError> {
                     out.close()?;
                 }
             }
+            if let Some(lists) = lists {
+                lists.write(rows, &mut group)?;
+            }
             group.close()?;
         }
         writer.close()?;
@@ -48,7 +63,7 @@ pub fn write_parquet(path: &Path, table: &Table) -> Result<(), TableError> {
     written.map_err(|e| TableError::unwritable(path, e))
 }
 
-fn schema(table: &Table) -> Result<Type, ParquetError> {
+fn schema(table: &Table, lists: Option<&Lists>) -> Result<Type, ParquetError> {
     let fields = table.columns().map(|(name, column)| {
         let (physical, logical) = match column.raw() {
             Values::F64(_) => (Physical::DOUBLE, None),
@@ -72,6 +87,7 @@ fn schema(table: &Table) -> Result<Type, ParquetError> {
             .build()?;
         Ok(Arc::new(field))
     });
+    let fields = fields.chain(lists.map(Lists::schema));
     let fields = fields.collect::<Result<Vec<_>, ParquetError>>()?;
     Type::group_type_builder("table").with_fields(fields).build()
 }

@@ -16,7 +16,7 @@ use super::significance::{Tested, test_stones};
 use super::solution::Solution;
 use super::state::Adjustment;
 use crate::geometry::Rigid3;
-use crate::stone::{MotionFailure, NeighbourCovariance, PairResult, StoneMotion};
+use crate::stone::{MotionFailure, NeighbourCovariance, PairResult, SharedParts, StoneMotion};
 use crate::switches::is_on;
 use nalgebra::{DMatrix, Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
@@ -255,12 +255,10 @@ fn motion(
         local[(k, k)] += variance;
     }
     let photos = adjustment.photo_part(i);
+    let of_points = octaves.over_all(photos.as_ref()) + octaves.of_stone();
+    let of_poses = photos.map_or_else(Matrix3::zeros, |photos| photos.pose_covariance(&photos, poses));
     let mut translation = local.fixed_view_mut::<3, 3>(0, 0);
-    translation += octaves.over_all(photos.as_ref()) + octaves.of_stone();
-
-    if let Some(photos) = photos {
-        translation += photos.pose_covariance(&photos, poses);
-    }
+    translation += of_points + of_poses;
     let covariance = in_world(&local, &world);
     let prediction = &solution.field.from_others[i];
     let common = adjustment.prior.common_in(i).translation();
@@ -272,6 +270,10 @@ fn motion(
         displacement,
         rotation,
         covariance,
+        shared: SharedParts {
+            points: world * of_points * world.transpose(),
+            poses: world * of_poses * world.transpose(),
+        },
         relative: displacement - expected,
         relative_covariance: world * estimate.relative_covariance * world.transpose(),
         own_motion_p: tested.p_value,
@@ -364,6 +366,7 @@ mod tests {
             displacement: Vector3::zeros(),
             rotation: Vector3::zeros(),
             covariance: Matrix6::from_diagonal(&nalgebra::Vector6::new(1e-6, sd * sd, 1e-6, 1.0, 1.0, 1.0)),
+            shared: SharedParts::default(),
             relative: Vector3::zeros(),
             relative_covariance: Matrix3::zeros(),
             own_motion_p: 1.0,

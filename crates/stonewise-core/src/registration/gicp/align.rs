@@ -60,6 +60,7 @@ fn align_one(
         displacement: shift,
         rotation: turn.scaled_axis(),
         covariance,
+        shared: SharedParts::default(),
         relative: Vector3::zeros(),
         own_motion_p: 1.0,
         relative_covariance: Matrix3::zeros(),

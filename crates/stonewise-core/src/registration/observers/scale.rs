@@ -61,6 +61,12 @@ impl ScaleError {
         place - self.centre
     }
 
+    /// Covariance of the error at a place, world, m^2.
+    pub fn covariance_at(&self, place: &Point3<f64>) -> Matrix3<f64> {
+        let arm = self.arm(place) * self.sd;
+        arm * arm.transpose()
+    }
+
     /// The expected error at a place, world, metres.
     pub fn at(&self, place: &Point3<f64>) -> Vector3<f64> {
         self.arm(place) * self.mean

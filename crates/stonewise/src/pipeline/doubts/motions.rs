@@ -133,7 +133,7 @@ mod tests {
     use nalgebra::{Matrix3, Matrix6, Vector3};
     use stonewise_core::geometry::Rigid3;
     use stonewise_core::id::StoneId;
-    use stonewise_core::stone::{MotionFailure, PairResult};
+    use stonewise_core::stone::{MotionFailure, PairResult, SharedParts};
 
     /// Motions of the stones that have one in `rows`, with these standard deviations and residuals.
     fn registered(rows: &[StoneRow], sd_m: f64, rmse_m: f64) -> Registered {
@@ -142,6 +142,7 @@ mod tests {
             displacement: Vector3::zeros(),
             rotation: Vector3::zeros(),
             covariance: Matrix6::identity() * sd_m.powi(2),
+            shared: SharedParts::default(),
             relative: Vector3::zeros(),
             relative_covariance: Matrix3::identity(),
             own_motion_p: 1.0,

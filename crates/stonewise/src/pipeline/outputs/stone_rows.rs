@@ -4,7 +4,7 @@ use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::r#match::Matched;
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::Datum;
-use crate::results::{Facade, Reference, StoneRow};
+use crate::results::{Facade, Reference, StoneRow, Term};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use stonewise_core::epoch::Pair;
@@ -33,12 +33,20 @@ pub fn stone_rows(
     let deformed: BTreeMap<_, _> = deformed.map(|s| (s.stone, s)).collect();
     let relative = registered.relative_errors();
 
-    let by_scale = |stone: &Stone| {
-        let scale = registered.epoch_errors.as_ref().and_then(|e| e.scale.as_ref());
-        scale.map_or_else(Vector3::zeros, |scale| scale.at(&stone.centroid))
-    };
+    let scale = registered.epoch_errors.as_ref().and_then(|e| e.scale.as_ref());
+    let by_scale = |stone: &Stone| scale.map_or_else(Vector3::zeros, |scale| scale.at(&stone.centroid));
     let shared = registered.shared_errors();
     let shared = |stone: &Stone| shared.get(&stone.id).map_or_else(Matrix3::zeros, |s| **s);
+    // `whole`: covariance of the error of the epochs, whatever its cause.
+    let terms = |stone: &Stone, whole: Matrix3<f64>| {
+        let of_scale = scale.map_or_else(Matrix3::zeros, |scale| scale.covariance_at(&stone.centroid));
+        let shared = shared(stone);
+        vec![
+            (Term::Scale, of_scale),
+            (Term::Photos, shared - of_scale),
+            (Term::Registration, whole - shared),
+        ]
+    };
 
     // Stones turn with the rigid part of the error; how its drifts turn single stones is not estimated.
     let turn = registered.epoch_errors.as_ref();
@@ -58,15 +66,20 @@ pub fn stone_rows(
                     error: error.map_or_else(|| by_scale(stone), |e| e.mean),
                     turn: error.map_or_else(Vector3::zeros, |_| turn),
                     motion: Vector3::zeros(),
-                    covariance: error.map_or_else(|| covariance + shared(stone), |e| e.covariance),
+                    terms: terms(
+                        stone,
+                        error.map_or_else(|| covariance + shared(stone), |e| e.covariance),
+                    ),
                     rotation_covariance,
                 }
             }
             _ => {
-                let relative = relative.get(&stone.id).map_or_else(Matrix3::zeros, |r| **r);
+                let relative = relative
+                    .get(&stone.id)
+                    .map_or_else(Vec::new, |r| terms(stone, **r));
                 Reference {
                     error: by_scale(stone),
-                    ..Reference::against(common.as_ref(), stone, &relative)
+                    ..Reference::against(common.as_ref(), stone, relative)
                 }
             }
         };

@@ -6,7 +6,7 @@ use crate::report_params::Language;
 use crate::results::records::{
     ComparedInstrument, Datum, DatumState, DatumUse, InstrumentsEpoch, LeftOutInstrument, WhyLeftOut,
 };
-use crate::results::{Reference, RowMotion, StoneRow};
+use crate::results::{Reference, RowMotion, StoneRow, Term};
 use crate::texts::Said;
 use crate::texts::notices::{
     DATUM_INSTRUMENTS, INSTRUMENTS_CONTRADICTED, INSTRUMENTS_DISAGREE, INSTRUMENTS_LEFT_OUT,
@@ -267,13 +267,14 @@ fn update(shown: Before, error: &RegistrationError, normals: &Normals, count: us
         let alone = RowMotion {
             covariance: without_negative(&(motion.covariance - shared(&before))),
             rotation_covariance: without_negative(&(motion.rotation_covariance - rotation_before)),
+            budget: motion.budget.clone().without(Term::Registration),
             ..motion.clone()
         };
         let reference = Reference {
             error: error.at(&row.centroid),
             turn: error.turn(),
             motion: Vector3::zeros(),
-            covariance: shared(&datum),
+            terms: vec![(Term::Registration, shared(&datum))],
             rotation_covariance: rotation_after,
         };
         row.motion = Some(alone.against(normal, &reference));
