@@ -9,13 +9,14 @@ use super::records::{
     Datum, InstrumentsRecord, RegistrationRecord, Remarks, RunRecord, TrendsRecord, Verdict,
 };
 use super::stone_table::read_stones;
-use super::{Evidence, Facade, RowMotion, StoneRow, read_neighbours, read_velocities};
+use super::{Evidence, Facade, RowMotion, StoneCourse, StoneRow, read_courses, read_neighbours};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_base::error::Error;
 use stonewise_base::files::is_there;
+use stonewise_base::thresholds::Thresholds;
 use stonewise_core::evaluate::Evaluation;
 use stonewise_core::geometry::FaceFrame;
 use stonewise_core::stone::NeighbourCovariance;
@@ -52,8 +53,8 @@ pub struct ResultSet {
     pub verdict: Option<Verdict>,
     /// `trends.json`, where there are more than two epochs.
     pub trends: Option<TrendsRecord>,
-    /// Velocities by stone, along the wall, up and out, from `trends.parquet`; metres a year.
-    pub velocities: BTreeMap<u32, Vector3<f64>>,
+    /// What stones do over time, by stone, from `trends.parquet`.
+    pub courses: BTreeMap<u32, StoneCourse>,
     /// `instruments.json`, where the project names instruments.
     pub instruments: Option<InstrumentsRecord>,
     /// Decisions about mask instances by epoch, from `audit_epochN.csv`: rows of event, photo, instance,
@@ -95,7 +96,7 @@ impl ResultSet {
             remarks,
             verdict: read_json(&dir.join(VERDICT))?,
             trends: read_json(&dir.join(TRENDS))?,
-            velocities: read_velocities(dir)?,
+            courses: read_courses(dir)?,
             instruments: read_json(&dir.join(INSTRUMENTS))?,
             decisions: read_decisions(dir)?,
             edits: read_rows(&dir.join(EDITS_AUDIT))?.unwrap_or_default(),
@@ -152,7 +153,7 @@ impl ResultSet {
             neighbours: Vec::new(),
             verdict: None,
             trends: None,
-            velocities: BTreeMap::new(),
+            courses: BTreeMap::new(),
             instruments: None,
             decisions: Vec::new(),
             edits: Vec::new(),
@@ -166,6 +167,12 @@ impl ResultSet {
     /// What is known about the registration of the later epoch; `None` where `registration.json` is missing.
     pub fn datum(&self) -> Option<&Datum> {
         self.registration.as_ref().map(|r| &r.datum)
+    }
+
+    /// The thresholds of the verdict; none where there is no verdict.
+    pub fn thresholds(&self) -> Thresholds {
+        let verdict = self.verdict.as_ref();
+        verdict.map(|v| v.thresholds.clone()).unwrap_or_default()
     }
 
     /// Measured stones with their motion.

@@ -92,7 +92,7 @@ const RESULTS: Layers = &[
         "stone_row",
     ],
     &["columns", "evidence", "outlines", "scale", "zone_place"],
-    &["neighbours", "stone_table", "velocities"],
+    &["courses", "neighbours", "stone_table"],
     &["result_set"],
     &["comparison", "joints"],
     &["export"],
