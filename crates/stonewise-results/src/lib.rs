@@ -9,6 +9,7 @@ mod courses;
 mod evidence;
 pub mod export;
 mod facade;
+mod fixed_datum;
 mod joints;
 pub mod names;
 mod neighbours;
@@ -39,6 +40,7 @@ pub use evidence::{
     track_side_px, write_cameras, write_crops, write_logo, write_sections, write_thin_cloud, write_tracks,
 };
 pub use facade::Facade;
+pub use fixed_datum::fixed_datum;
 pub use joints::{Joint, JointMotion, joints};
 pub use neighbours::{read_neighbours, write_neighbours};
 pub use outlines::{StoneOutline, read_outlines, write_outlines};

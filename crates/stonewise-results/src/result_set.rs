@@ -111,6 +111,21 @@ impl ResultSet {
     /// # Errors
     /// As [`Self::read_pair`].
     pub fn read_measured(dir: &Path, pair: usize) -> Result<Self, Error> {
+        let core = read_distance_points(&dir.join(PairFile::M3c2Csv.place(pair)))?;
+        Ok(Self {
+            distances: core.distances,
+            without_distance: core.without_distance,
+            evaluation: read_json(&dir.join(PairFile::Evaluation.place(pair)))?,
+            neighbours: read_neighbours(dir, pair)?,
+            ..Self::read_motions(dir, pair)?
+        })
+    }
+
+    /// Reads the stones of a pair with their outlines and registration, and the record of the run.
+    ///
+    /// # Errors
+    /// As [`Self::read_pair`].
+    pub(super) fn read_motions(dir: &Path, pair: usize) -> Result<Self, Error> {
         let path = dir.join(PairFile::StonesParquet.place(pair));
         if !is_there(&path)? {
             stones_in(dir)?;
@@ -120,19 +135,13 @@ impl ResultSet {
         stones.sort_by_key(|s| s.stone_id);
         let outlines = read_outlines(dir)?;
         let facade: Option<Facade> = read_json(&dir.join(FACADE))?;
-        let core = read_distance_points(&dir.join(PairFile::M3c2Csv.place(pair)))?;
-
         let facade =
             facade.unwrap_or_else(|| facade_of(stones.iter().map(|s| (s.stone_id, s.centroid)), &outlines));
         Ok(Self {
             pair,
             pairs: pairs_in(dir)?,
-            distances: core.distances,
-            without_distance: core.without_distance,
-            evaluation: read_json(&dir.join(PairFile::Evaluation.place(pair)))?,
             run: read_json(&dir.join(RUN))?,
             registration: read_json(&dir.join(PairFile::Registration.place(pair)))?,
-            neighbours: read_neighbours(dir, pair)?,
             ..Self::of_stones(stones, outlines, facade)
         })
     }

@@ -94,7 +94,7 @@ const RESULTS: Layers = &[
     &["columns", "evidence", "outlines", "scale", "zone_place"],
     &["courses", "neighbours", "stone_table"],
     &["result_set"],
-    &["comparison", "joints"],
+    &["comparison", "fixed_datum", "joints"],
     &["export"],
 ];
 
@@ -152,7 +152,7 @@ const PY: Layers = &[
     &["clouds", "error"],
     &["arrays", "attended"],
     &["command", "view"],
-    &["adjust", "detector", "m3c2", "transfer", "units"],
+    &["adjust", "detector", "fixed", "m3c2", "transfer", "units"],
 ];
 
 #[test]
