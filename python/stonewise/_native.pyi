@@ -76,6 +76,9 @@ def run(
     note: Optional[Callable[[str], Any]],
 ) -> None: ...
 def simulate(out: _Path, parameters: str, force: bool, progress: _Progress) -> Path: ...
+def fixed(results: _Path, stones: str, out: _Path) -> None:
+    """Writes the table of ``stonewise datum`` as Parquet."""
+
 def m3c2(
     points_1: NDArray[np.float64],
     points_2: NDArray[np.float64],

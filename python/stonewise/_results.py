@@ -6,6 +6,8 @@ import functools
 import html
 import json
 import os
+import tempfile
+from collections.abc import Iterable
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +21,7 @@ from numpy.typing import NDArray
 
 from . import _map, _tables
 from ._native import Error
+from ._native import fixed as _native_fixed
 
 __all__ = ["Pair", "Results", "Warning", "open"]
 
@@ -286,6 +289,20 @@ class Results(Pair):
     def verdict(self) -> Optional[dict[str, Any]]:
         """``verdict.json``, where the run wrote one, else ``None``."""
         return _read_json_if_there(self.path / "verdict.json")
+
+    def fixed(self, stones: Union[str, Iterable[int]]) -> Any:
+        """Motions and covariances of all later epochs with these stones, or the zone of this name, as the datum, without a new run: the
+        table of ``stonewise datum``, pandas, else Arrow.
+
+        :raises Error: A stone or zone is not in the results, or fewer than three of the stones were measured.
+
+        >>> r.fixed([12, 13, 14, 57])                        # doctest: +SKIP
+        """
+        chosen = stones if isinstance(stones, str) else ",".join(str(int(stone)) for stone in stones)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "fixed.parquet"
+            _native_fixed(self.path, chosen, path)
+            return _tables.dressed(_read_parquet(path))
 
     @property
     def report(self) -> Path:

@@ -3,42 +3,90 @@
 use nalgebra::Point2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use stonewise_core::params::{ParamError, Params, Range, Ranged, with_ranges};
+use stonewise_core::params::{Numbers, ParamError, Params, Range, Ranged, with_ranges};
+
+/// What is compared with thresholds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    /// The length of a stone's motion, millimetres.
+    Length,
+    /// A stone's motion out of the face, millimetres.
+    Out,
+    /// A stone's motion up the face, millimetres.
+    Up,
+    /// A stone's motion along the wall, millimetres.
+    Along,
+    /// The length of a stone's motion against its neighbours, millimetres.
+    Neighbours,
+    /// The opening of a joint, millimetres.
+    Joints,
+    /// The largest deformation of a zone, millimetres.
+    Deformation,
+    /// The length of a stone's velocity, millimetres a year.
+    Rate,
+    /// The departure of a stone's newest epoch from what the model of a series predicts, standard deviations.
+    Departure,
+}
+
+impl Quantity {
+    /// Every quantity, in the order in which reasons name them.
+    pub const ALL: [Self; 9] = [
+        Self::Length,
+        Self::Out,
+        Self::Up,
+        Self::Along,
+        Self::Neighbours,
+        Self::Joints,
+        Self::Deformation,
+        Self::Rate,
+        Self::Departure,
+    ];
+
+    /// The word in files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Length => "length",
+            Self::Out => "out",
+            Self::Up => "up",
+            Self::Along => "along",
+            Self::Neighbours => "neighbours",
+            Self::Joints => "joints",
+            Self::Deformation => "deformation",
+            Self::Rate => "rate",
+            Self::Departure => "departure",
+        }
+    }
+}
+
+/// How serious it is to be beyond a threshold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Level {
+    /// It calls for attention.
+    Attention,
+    /// It is an alarm.
+    Alarm,
+}
+
+/// A limit of a quantity.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Threshold {
+    /// What is limited.
+    pub quantity: Quantity,
+    /// What follows beyond the limit.
+    pub level: Level,
+    /// The limit in the unit of the quantity: an upper one where it is positive, a lower one where it is negative.
+    pub limit: f64,
+}
 
 /// The thresholds of a project; nothing is given by default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Keys", into = "Keys")]
 pub struct Thresholds {
-    /// Thresholds of the wall.
-    pub wall: Measures,
-    /// Of the largest deformation of a zone; those of lengths of motions where it has none of its own.
-    pub deformation: Levels,
-    /// Parts of the wall with thresholds of their own.
-    pub zones: Vec<Zone>,
-}
-
-/// Thresholds of everything that is judged.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Measures {
-    /// Of the length of a stone's motion.
-    pub length: Levels,
-    /// Of the length of its motion against its neighbours.
-    pub neighbours: Levels,
-    /// Of the opening of a joint.
-    pub joints: Levels,
-}
-
-/// Two thresholds of one quantity.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(transform = with_ranges::<Levels>)]
-pub struct Levels {
-    /// From here on attention is called for, millimetres.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub attention_mm: Option<f64>,
-    /// From here on an alarm is raised, millimetres.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub alarm_mm: Option<f64>,
+    keys: Keys,
+    wall: Vec<Threshold>,
+    zones: Vec<Zone>,
 }
 
 /// A part of the wall.
@@ -49,150 +97,254 @@ pub struct Zone {
     /// Corners (along, up) in the facade frame, metres, as in `along_m` and `up_m` of the stone table; the
     /// last is joined to the first.
     pub polygon: Vec<[f64; 2]>,
-    /// Its thresholds; those of the wall where it has none of its own.
-    pub measures: Measures,
+    /// Its thresholds, and those of the wall for quantities of which it has none.
+    thresholds: Vec<Threshold>,
 }
 
-/// The table as files spell it.
-#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(transform = with_ranges::<Thresholds>)]
-struct Keys {
-    /// From this length of a stone's motion on attention is called for, millimetres. Absent: the alarm's.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    attention_mm: Option<f64>,
-    /// From this length of a stone's motion on an alarm is raised, millimetres.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    alarm_mm: Option<f64>,
-    /// From this deformation of a zone on attention is called for, millimetres. Absent: the alarm's; where neither is
-    /// given, the thresholds of the length of a motion hold.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    deformation_attention_mm: Option<f64>,
-    /// From this deformation of a zone on an alarm is raised, millimetres.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    deformation_alarm_mm: Option<f64>,
-    /// Thresholds of the motion of a stone against its neighbours.
-    #[serde(default, skip_serializing_if = "Levels::is_empty")]
-    neighbours: Levels,
-    /// Thresholds of the opening of a joint between two stones.
-    #[serde(default, skip_serializing_if = "Levels::is_empty")]
-    joints: Levels,
-    /// Parts of the wall with thresholds of their own.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    zones: Vec<ZoneKeys>,
-}
-
-/// A part of the wall, as files spell it.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+/// Two thresholds of one quantity.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(transform = with_ranges::<Levels>)]
-struct ZoneKeys {
-    /// Name, as the verdict shows it.
-    name: String,
-    /// Corners [along, up] in the facade frame, metres: `along_m` and `up_m` of stones.csv.
-    polygon: Vec<[f64; 2]>,
-    /// From this length of a stone's motion on attention is called for, millimetres. Absent: the alarm's.
+struct Levels {
+    /// From here on attention is called for, millimetres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     attention_mm: Option<f64>,
-    /// From this length of a stone's motion on an alarm is raised, millimetres.
+    /// From here on an alarm is raised, millimetres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     alarm_mm: Option<f64>,
-    /// Thresholds of the motion of a stone against its neighbours.
-    #[serde(default, skip_serializing_if = "Levels::is_empty")]
-    neighbours: Levels,
-    /// Thresholds of the opening of a joint between two stones.
-    #[serde(default, skip_serializing_if = "Levels::is_empty")]
-    joints: Levels,
+}
+
+/// The limits of a quantity in two fields of a table.
+macro_rules! pair {
+    ($table:ident, $quantity:ident, $attention:ident, $alarm:ident) => {
+        Pair {
+            quantity: Quantity::$quantity,
+            limits: [
+                (stringify!($attention), $table.$attention.numbers()),
+                (stringify!($alarm), $table.$alarm.numbers()),
+            ],
+        }
+    };
+}
+
+/// A table as files spell it: keys of its own, and those of the thresholds.
+macro_rules! table {
+    ($(#[$of_table:meta])* $name:ident { $($own:tt)* }) => {
+        $(#[$of_table])*
+        #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        #[schemars(transform = with_ranges::<$name>)]
+        struct $name {
+            /// From this length of a stone's motion on attention is called for, millimetres. Absent: the alarm's.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            attention_mm: Option<f64>,
+            /// From this length of a stone's motion on an alarm is raised, millimetres.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            alarm_mm: Option<f64>,
+            /// Below the first (negative) or above the second (positive) motion of a stone out of the face attention is
+            /// called for, millimetres.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            out_attention_mm: Option<[f64; 2]>,
+            /// Below the first or above the second motion of a stone out of the face an alarm is raised, millimetres.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            out_alarm_mm: Option<[f64; 2]>,
+            /// As `out_attention_mm`, of the motion up the face, millimetres.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            up_attention_mm: Option<[f64; 2]>,
+            /// As `out_alarm_mm`, of the motion up the face, millimetres.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            up_alarm_mm: Option<[f64; 2]>,
+            /// As `out_attention_mm`, of the motion along the wall, millimetres.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            along_attention_mm: Option<[f64; 2]>,
+            /// As `out_alarm_mm`, of the motion along the wall, millimetres.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            along_alarm_mm: Option<[f64; 2]>,
+            /// Thresholds of the motion of a stone against its neighbours.
+            #[serde(default, skip_serializing_if = "Levels::is_empty")]
+            neighbours: Levels,
+            /// Thresholds of the opening of a joint between two stones.
+            #[serde(default, skip_serializing_if = "Levels::is_empty")]
+            joints: Levels,
+            /// From this deformation of a zone on attention is called for, millimetres. Absent: the alarm's; where neither
+            /// is given, the thresholds of the length of a motion hold.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            deformation_attention_mm: Option<f64>,
+            /// From this deformation of a zone on an alarm is raised, millimetres.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            deformation_alarm_mm: Option<f64>,
+            /// From this velocity of a stone on attention is called for, millimetres a year. Absent: the alarm's.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            rate_attention_mm_per_year: Option<f64>,
+            /// From this velocity of a stone on an alarm is raised, millimetres a year.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            rate_alarm_mm_per_year: Option<f64>,
+            /// From this departure of the newest epoch from what the model of the series predicts on attention is called
+            /// for, standard deviations. Absent: the alarm's.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            departure_attention_sd: Option<f64>,
+            /// From this departure of the newest epoch from the model on an alarm is raised, standard deviations.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            departure_alarm_sd: Option<f64>,
+            $($own)*
+        }
+
+        impl $name {
+            fn pairs(&self) -> [Pair; 7] {
+                [
+                    pair!(self, Length, attention_mm, alarm_mm),
+                    pair!(self, Out, out_attention_mm, out_alarm_mm),
+                    pair!(self, Up, up_attention_mm, up_alarm_mm),
+                    pair!(self, Along, along_attention_mm, along_alarm_mm),
+                    pair!(self, Deformation, deformation_attention_mm, deformation_alarm_mm),
+                    pair!(self, Rate, rate_attention_mm_per_year, rate_alarm_mm_per_year),
+                    pair!(self, Departure, departure_attention_sd, departure_alarm_sd),
+                ]
+            }
+
+            fn thresholds(&self) -> Vec<Threshold> {
+                let levels = [
+                    self.neighbours.pair(Quantity::Neighbours),
+                    self.joints.pair(Quantity::Joints),
+                ];
+                self.pairs().iter().chain(&levels).flat_map(Pair::thresholds).collect()
+            }
+        }
+
+        impl Params for $name {
+            fn ranges(&self) -> Vec<Ranged> {
+                self.pairs().iter().flat_map(Pair::ranges).collect()
+            }
+
+            fn check_relations(&self) -> Result<(), ParamError> {
+                self.pairs().iter().try_for_each(Pair::check)
+            }
+
+            fn parts(&self) -> Vec<(&'static str, &dyn Params)> {
+                vec![("neighbours", &self.neighbours), ("joints", &self.joints)]
+            }
+        }
+    };
+}
+
+table! {
+    /// The table as files spell it.
+    Keys {
+        /// Parts of the wall with thresholds of their own.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        zones: Vec<ZoneKeys>,
+    }
+}
+
+table! {
+    /// A part of the wall, as files spell it.
+    ZoneKeys {
+        /// Name, as the verdict shows it.
+        name: String,
+        /// Corners [along, up] in the facade frame, metres: `along_m` and `up_m` of stones.csv.
+        polygon: Vec<[f64; 2]>,
+    }
+}
+
+/// The limits of a quantity by their keys: of attention, of an alarm. A quantity with a sign has a lower and an upper one.
+struct Pair {
+    quantity: Quantity,
+    limits: [(&'static str, Vec<f64>); 2],
+}
+
+impl Pair {
+    fn is_signed(&self) -> bool {
+        matches!(self.quantity, Quantity::Out | Quantity::Up | Quantity::Along)
+    }
+
+    fn ranges(&self) -> Vec<Ranged> {
+        let unsigned = self.limits.iter().filter(|_| !self.is_signed());
+        unsigned
+            .map(|(key, limits)| Range::POSITIVE.holds(key, limits.as_slice()))
+            .collect()
+    }
+
+    fn check(&self) -> Result<(), ParamError> {
+        let error =
+            |key, limits: &[f64], allowed: String| Err(ParamError::new(key, written(limits), allowed));
+        for (key, limits) in &self.limits {
+            let is_sound = |[lower, upper]: [f64; 2]| {
+                lower.is_finite() && upper.is_finite() && lower < 0.0 && upper > 0.0
+            };
+            if let [lower, upper] = limits[..]
+                && !is_sound([lower, upper])
+            {
+                let allowed =
+                    "[lower limit below 0, upper limit above 0]: a stone that stands still lies between them";
+                return error(*key, limits, allowed.to_owned());
+            }
+        }
+        let [(key, attention), (alarm_key, alarm)] = &self.limits;
+        let is_inside = alarm
+            .iter()
+            .zip(attention)
+            .any(|(alarm, attention)| alarm.abs() < attention.abs());
+        if is_inside || (!alarm.is_empty() && alarm == attention) {
+            let side = if self.is_signed() { "inside" } else { "below" };
+            let alarm = written(alarm);
+            return error(
+                *key,
+                attention,
+                format!("{side} {alarm_key} = {alarm}: attention comes before the alarm"),
+            );
+        }
+        Ok(())
+    }
+
+    fn thresholds(&self) -> impl Iterator<Item = Threshold> {
+        let quantity = self.quantity;
+        let levels = self.limits.iter().zip([Level::Attention, Level::Alarm]);
+        levels.flat_map(move |((_, limits), level)| {
+            limits.iter().map(move |limit| Threshold {
+                quantity,
+                level,
+                limit: *limit,
+            })
+        })
+    }
+}
+
+/// Limits as the project file spells them.
+fn written(limits: &[f64]) -> String {
+    match limits {
+        [only] => only.to_string(),
+        _ => format!("{limits:?}"),
+    }
 }
 
 impl Levels {
-    /// Whether neither threshold is given.
-    pub fn is_empty(&self) -> bool {
+    fn is_empty(&self) -> bool {
         self.attention_mm.is_none() && self.alarm_mm.is_none()
     }
 
-    /// Where attention begins, metres: at the alarm where no threshold of attention is given.
-    pub fn attention_m(&self) -> Option<f64> {
-        self.attention_mm.or(self.alarm_mm).map(|mm| mm / 1e3)
-    }
-
-    /// Where an alarm begins, metres.
-    pub fn alarm_m(&self) -> Option<f64> {
-        self.alarm_mm.map(|mm| mm / 1e3)
-    }
-
-    fn or(self, other: Self) -> Self {
-        if self.is_empty() { other } else { self }
+    fn pair(&self, quantity: Quantity) -> Pair {
+        Pair {
+            quantity,
+            ..pair!(self, Length, attention_mm, alarm_mm)
+        }
     }
 }
 
 impl Params for Levels {
     fn ranges(&self) -> Vec<Ranged> {
-        vec![
-            Range::POSITIVE.holds("attention_mm", self.attention_mm),
-            Range::POSITIVE.holds("alarm_mm", self.alarm_mm),
-        ]
+        self.pair(Quantity::Length).ranges()
     }
 
     fn check_relations(&self) -> Result<(), ParamError> {
-        match (self.attention_mm, self.alarm_mm) {
-            (Some(attention), Some(alarm)) if attention >= alarm => Err(ParamError::new(
-                "attention_mm",
-                attention,
-                format!("below alarm_mm = {alarm}: attention comes before the alarm"),
-            )),
-            _ => Ok(()),
-        }
-    }
-}
-
-impl Measures {
-    /// Whether no threshold is given.
-    pub fn is_empty(&self) -> bool {
-        self.length.is_empty() && self.neighbours.is_empty() && self.joints.is_empty()
-    }
-
-    fn or(self, other: Self) -> Self {
-        Self {
-            length: self.length.or(other.length),
-            neighbours: self.neighbours.or(other.neighbours),
-            joints: self.joints.or(other.joints),
-        }
-    }
-}
-
-impl Params for Measures {
-    fn ranges(&self) -> Vec<Ranged> {
-        self.length.ranges()
-    }
-
-    fn check_relations(&self) -> Result<(), ParamError> {
-        self.length.check_relations()
-    }
-
-    fn parts(&self) -> Vec<(&'static str, &dyn Params)> {
-        vec![("neighbours", &self.neighbours), ("joints", &self.joints)]
+        self.pair(Quantity::Length).check()
     }
 }
 
 impl Params for Thresholds {
-    fn ranges(&self) -> Vec<Ranged> {
-        let mut ranges = self.wall.ranges();
-        ranges.extend([
-            Range::POSITIVE.holds("deformation_attention_mm", self.deformation.attention_mm),
-            Range::POSITIVE.holds("deformation_alarm_mm", self.deformation.alarm_mm),
-        ]);
-        ranges
-    }
-
-    fn check_relations(&self) -> Result<(), ParamError> {
-        self.wall.check()?;
-        self.deformation.check_relations().map_err(|error| ParamError {
-            key: format!("deformation_{}", error.key),
-            ..error
-        })?;
-        for (number, zone) in self.zones.iter().enumerate() {
-            let checked = zone.measures.check();
+    fn check(&self) -> Result<(), ParamError> {
+        self.keys.check()?;
+        for (number, zone) in self.keys.zones.iter().enumerate() {
+            let checked = zone.check();
             checked.map_err(|error| error.within(&format!("zones.{number}")))?;
         }
         Ok(())
@@ -214,14 +366,12 @@ impl Zone {
 impl Thresholds {
     /// Whether no threshold is given at all.
     pub fn is_empty(&self) -> bool {
-        self.wall.is_empty()
-            && self.deformation.is_empty()
-            && self.zones.iter().all(|z| z.measures.is_empty())
+        self.wall.is_empty() && self.zones.iter().all(|z| z.thresholds.is_empty())
     }
 
-    /// The thresholds of a deformation.
-    pub fn of_deformation(&self) -> Levels {
-        self.deformation.or(self.wall.length)
+    /// Parts of the wall with thresholds of their own.
+    pub fn zones(&self) -> &[Zone] {
+        &self.zones
     }
 
     /// The first zone that holds a place (along, up) of the facade.
@@ -229,10 +379,33 @@ impl Thresholds {
         self.zones.iter().position(|zone| zone.contains(place))
     }
 
-    /// The thresholds in a zone, or of the wall outside all zones.
-    pub fn measures(&self, zone: Option<usize>) -> Measures {
-        zone.and_then(|i| self.zones.get(i))
-            .map_or(self.wall, |zone| zone.measures)
+    /// The thresholds of a quantity in a zone, or of the wall outside all zones. Where deformations have none, those of
+    /// the length of a motion hold.
+    pub fn of(&self, quantity: Quantity, zone: Option<usize>) -> impl Iterator<Item = Threshold> + Clone {
+        let zone = zone.and_then(|i| self.zones.get(i));
+        let all = zone.map_or(&self.wall, |zone| &zone.thresholds);
+        let is_given = all.iter().any(|t| t.quantity == quantity);
+        let quantity = match quantity {
+            Quantity::Deformation if !is_given => Quantity::Length,
+            given => given,
+        };
+        all.iter().copied().filter(move |t| t.quantity == quantity)
+    }
+
+    /// The farthest alarm threshold of motions of stones, metres, where colour scales end; that of the wall.
+    pub fn farthest_alarm_m(&self) -> Option<f64> {
+        let motions = [Quantity::Length, Quantity::Out, Quantity::Up, Quantity::Along];
+        let all = motions.into_iter().flat_map(|quantity| self.of(quantity, None));
+        let alarms = all.filter(|t| t.level == Level::Alarm);
+        alarms.map(|t| t.limit.abs() / 1e3).reduce(f64::max)
+    }
+
+    /// Whether a quantity has thresholds anywhere on the wall.
+    pub fn has(&self, quantity: Quantity) -> bool {
+        let zones = (0..self.zones.len()).map(Some);
+        zones
+            .chain([None])
+            .any(|zone| self.of(quantity, zone).next().is_some())
     }
 }
 
@@ -240,16 +413,9 @@ impl TryFrom<Keys> for Thresholds {
     type Error = String;
 
     fn try_from(keys: Keys) -> Result<Self, String> {
-        let wall = Measures {
-            length: Levels {
-                attention_mm: keys.attention_mm,
-                alarm_mm: keys.alarm_mm,
-            },
-            neighbours: keys.neighbours,
-            joints: keys.joints,
-        };
+        let wall: Vec<Threshold> = keys.thresholds();
         let mut zones: Vec<Zone> = Vec::new();
-        for keys in keys.zones {
+        for keys in &keys.zones {
             let name = keys.name.trim();
             if name.is_empty() || zones.iter().any(|z| z.name == name) {
                 return Err(format!(
@@ -258,59 +424,31 @@ impl TryFrom<Keys> for Thresholds {
             }
             zones.push(zone(keys, &wall)?);
         }
-        let deformation = Levels {
-            attention_mm: keys.deformation_attention_mm,
-            alarm_mm: keys.deformation_alarm_mm,
-        };
-        Ok(Self {
-            wall,
-            deformation,
-            zones,
-        })
+        Ok(Self { keys, wall, zones })
     }
 }
 
-fn zone(keys: ZoneKeys, wall: &Measures) -> Result<Zone, String> {
+fn zone(keys: &ZoneKeys, wall: &[Threshold]) -> Result<Zone, String> {
     let name = keys.name.trim().to_owned();
     if keys.polygon.len() < 3 || keys.polygon.iter().flatten().any(|v| !v.is_finite()) {
         return Err(format!(
             "polygon of zone {name:?} of [thresholds] needs three corners [along, up] at least, metres in the facade frame"
         ));
     }
-    let own = Measures {
-        length: Levels {
-            attention_mm: keys.attention_mm,
-            alarm_mm: keys.alarm_mm,
-        },
-        neighbours: keys.neighbours,
-        joints: keys.joints,
-    };
+    let mut thresholds: Vec<Threshold> = keys.thresholds();
+    let has_own = |quantity| thresholds.iter().any(|t| t.quantity == quantity);
+    let rest: Vec<Threshold> = wall.iter().copied().filter(|t| !has_own(t.quantity)).collect();
+    thresholds.extend(rest);
     Ok(Zone {
         name,
-        polygon: keys.polygon,
-        measures: own.or(*wall),
+        polygon: keys.polygon.clone(),
+        thresholds,
     })
 }
 
 impl From<Thresholds> for Keys {
     fn from(thresholds: Thresholds) -> Self {
-        let zone = |zone: Zone| ZoneKeys {
-            name: zone.name,
-            polygon: zone.polygon,
-            attention_mm: zone.measures.length.attention_mm,
-            alarm_mm: zone.measures.length.alarm_mm,
-            neighbours: zone.measures.neighbours,
-            joints: zone.measures.joints,
-        };
-        Self {
-            attention_mm: thresholds.wall.length.attention_mm,
-            alarm_mm: thresholds.wall.length.alarm_mm,
-            deformation_attention_mm: thresholds.deformation.attention_mm,
-            deformation_alarm_mm: thresholds.deformation.alarm_mm,
-            neighbours: thresholds.wall.neighbours,
-            joints: thresholds.wall.joints,
-            zones: thresholds.zones.into_iter().map(zone).collect(),
-        }
+        thresholds.keys
     }
 }
 
@@ -324,26 +462,39 @@ mod tests {
         Ok(thresholds)
     }
 
-    const FULL: &str = "attention_mm = 5\nalarm_mm = 10.0\ndeformation_attention_mm = 1.0\nneighbours = { attention_mm = 2.0, alarm_mm = 4.0 }\n\
-        [[zones]]\nname = \"crest\"\npolygon = [[0.0, 8.0], [9.0, 8.0], [9.0, 10.0], [0.0, 10.0]]\nalarm_mm = 3.0\n";
+    fn limits(thresholds: &Thresholds, quantity: Quantity, zone: Option<usize>) -> Vec<(Level, f64)> {
+        thresholds
+            .of(quantity, zone)
+            .map(|t| (t.level, t.limit))
+            .collect()
+    }
+
+    const FULL: &str = "attention_mm = 5\nalarm_mm = 10.0\nout_attention_mm = [-5, 10.0]\nout_alarm_mm = [-5, 20]\n\
+        deformation_attention_mm = 1.0\nneighbours = { attention_mm = 2.0, alarm_mm = 4.0 }\nrate_alarm_mm_per_year = 3\n\
+        [[zones]]\nname = \"crest\"\npolygon = [[0.0, 8.0], [9.0, 8.0], [9.0, 10.0], [0.0, 10.0]]\nalarm_mm = 3.0\n\
+        departure_attention_sd = 3.0\n";
 
     #[test]
     fn zones_have_their_own_thresholds_and_take_the_rest_from_the_wall() {
+        use Level::{Alarm, Attention};
         let thresholds = read(FULL).unwrap();
-        assert_eq!(thresholds.wall.length.attention_m(), Some(0.005));
+        let of = |quantity, zone| limits(&thresholds, quantity, zone);
+        assert_eq!(of(Quantity::Length, None), [(Attention, 5.0), (Alarm, 10.0)]);
         let crest = thresholds.zone_at(&Point2::new(4.0, 9.0));
         assert_eq!(crest, Some(0));
         assert_eq!(thresholds.zone_at(&Point2::new(4.0, 7.9)), None);
-        let measures = thresholds.measures(crest);
-        assert_eq!(
-            (measures.length.attention_m(), measures.length.alarm_m()),
-            (Some(0.003), Some(0.003))
-        );
-        assert_eq!(measures.neighbours.alarm_mm, Some(4.0));
-        assert!(measures.joints.is_empty());
-        assert_eq!(thresholds.of_deformation().attention_mm, Some(1.0));
+        assert_eq!(of(Quantity::Length, crest), [(Alarm, 3.0)]);
+        assert_eq!(of(Quantity::Neighbours, crest), [(Attention, 2.0), (Alarm, 4.0)]);
+        let out = [(Attention, -5.0), (Attention, 10.0), (Alarm, -5.0), (Alarm, 20.0)];
+        assert_eq!(of(Quantity::Out, crest), out);
+        assert_eq!(of(Quantity::Departure, crest), [(Attention, 3.0)]);
+        assert_eq!(of(Quantity::Departure, None), []);
+        assert!(thresholds.has(Quantity::Departure) && !thresholds.has(Quantity::Joints));
+        assert_eq!(of(Quantity::Deformation, None), [(Attention, 1.0)]);
+        assert_eq!(thresholds.farthest_alarm_m(), Some(0.02));
+        assert_eq!(read("attention_mm = 5").unwrap().farthest_alarm_m(), None);
         let length = read("alarm_mm = 4.0").unwrap();
-        assert_eq!(length.of_deformation().alarm_mm, Some(4.0));
+        assert_eq!(limits(&length, Quantity::Deformation, None), [(Alarm, 4.0)]);
         assert!(read("").unwrap().is_empty() && !thresholds.is_empty());
     }
 
@@ -364,6 +515,26 @@ mod tests {
                 "attention_mm = 10 is not possible: it must be below alarm_mm = 5",
             ),
             ("attention_mm = 5.0\nalarm_mm = 5.0", "must be below"),
+            (
+                "out_attention_mm = [-5, 10]\nout_alarm_mm = [-4, 20]",
+                "out_attention_mm = [-5.0, 10.0] is not possible: it must be inside out_alarm_mm = [-4.0, 20.0]",
+            ),
+            (
+                "up_attention_mm = [-5, 5]\nup_alarm_mm = [-5, 5]",
+                "must be inside",
+            ),
+            (
+                "along_alarm_mm = [10, -5]",
+                "along_alarm_mm = [10.0, -5.0] is not possible: it must be [lower limit below 0, upper limit above 0]",
+            ),
+            ("along_alarm_mm = [2, 5]", "lower limit below 0"),
+            ("along_alarm_mm = [-2, inf]", "lower limit below 0"),
+            ("out_alarm_mm = 5.0", "invalid type"),
+            (
+                "rate_attention_mm_per_year = 2\nrate_alarm_mm_per_year = 1",
+                "must be below rate_alarm_mm_per_year = 1",
+            ),
+            ("departure_alarm_sd = 0", "must be above 0"),
             (
                 "deformation_attention_mm = 2.0\ndeformation_alarm_mm = 1.0",
                 "deformation_attention_mm = 2 is not possible: it must be below",

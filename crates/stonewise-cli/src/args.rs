@@ -32,7 +32,10 @@ pub struct Args {
 /// Headings of the list of commands, each with its commands.
 const GROUPS: [(&str, &[&str]); 4] = [
     ("Measure", &["init", "check", "run", "studio", "report", "demo"]),
-    ("Understand and correct", &["info", "explain", "edits", "verify"]),
+    (
+        "Understand and correct",
+        &["info", "explain", "edits", "verify", "datum"],
+    ),
     ("Plan and judge", &["design", "evaluate"]),
     ("More", &["compare", "detector", "test", "self"]),
 ];
@@ -119,6 +122,15 @@ pub enum Command {
         Examples:\n  stonewise verify results/\n  stonewise verify results/ survey/stonewise.toml"
     )]
     Verify(VerifyArgs),
+    /// Take stones as fixed: motions of finished results against them
+    #[command(
+        after_help = "The rigid motion of these stones is estimated by least squares and taken off all stones \
+        (S-transformation), without a new run. Errors of the stones count as independent but for \
+        what all share of the registration.\n\n\
+        Examples:\n  stonewise datum results/ --fixed 12,13,14,57 --out against_pier.csv\n  \
+        stonewise datum results/ --fixed pier --out against_pier.csv"
+    )]
+    Datum(DatumArgs),
     /// Predict what the next survey will see; plan the first one
     #[command(
         after_help = "Says what the first survey shows of the wall: standard deviations of every stone, the \
@@ -579,6 +591,19 @@ pub struct VerifyArgs {
     /// Print the findings as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `datum`.
+#[derive(Debug, ClapArgs)]
+pub struct DatumArgs {
+    /// Folder of a finished run.
+    pub results: PathBuf,
+    /// Stones that count as fixed: numbers with commas between them, or the name of a zone of [[thresholds.zones]].
+    #[arg(long, value_name = "STONES|ZONE")]
+    pub fixed: String,
+    /// CSV file to write, with the columns of stones.csv.
+    #[arg(long, value_name = "CSV")]
+    pub out: PathBuf,
 }
 
 /// Arguments of `design`.

@@ -187,6 +187,12 @@ impl<T: Numbers> Numbers for Option<T> {
     }
 }
 
+impl<T: Numbers, const N: usize> Numbers for [T; N] {
+    fn numbers(&self) -> Vec<f64> {
+        self.as_slice().numbers()
+    }
+}
+
 impl<T: Numbers> Numbers for &[T] {
     fn numbers(&self) -> Vec<f64> {
         self.iter().flat_map(Numbers::numbers).collect()

@@ -126,6 +126,7 @@ fn names(scans: &[PathBuf]) -> Vec<String> {
 mod tests {
     use super::*;
     use std::fs;
+    use stonewise_base::thresholds::Quantity;
 
     fn scans(dir: &Path, names: &[&str]) -> Vec<PathBuf> {
         let write = |name: &&str| {
@@ -185,7 +186,8 @@ mod tests {
         let edited = fs::read_to_string(&path).unwrap() + "\n[thresholds]\nalarm_mm = 7.5\n";
         fs::write(&path, edited).unwrap();
         let again = ScansProject::new(&all[..2], dir.path()).unwrap();
-        assert_eq!(again.project.settings.thresholds.wall.length.alarm_mm, Some(7.5));
+        let mut alarms = again.project.settings.thresholds.of(Quantity::Length, None);
+        assert_eq!(alarms.next().map(|t| t.limit), Some(7.5));
         assert!(ScansProject::new(&all, dir.path()).is_err());
     }
 

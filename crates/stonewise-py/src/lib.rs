@@ -10,6 +10,7 @@ mod clouds;
 mod command;
 mod detector;
 mod error;
+mod fixed;
 mod m3c2;
 mod transfer;
 mod units;
@@ -28,6 +29,8 @@ mod _native {
     use crate::detector::Detector;
     #[pymodule_export]
     use crate::error::Error;
+    #[pymodule_export]
+    use crate::fixed::fixed;
     #[pymodule_export]
     use crate::m3c2::{m3c2, thin};
     #[pymodule_export]

@@ -1,7 +1,7 @@
 //! The facts that the report states in words.
 
 use crate::texts::Texts;
-use crate::verdict::{is_doubted, verdict_on};
+use crate::verdict::{Course, Pair, is_doubted, verdict_on};
 use nalgebra::Point2;
 use std::collections::BTreeMap;
 use stonewise_base::report_params::{Language, ReportParams};
@@ -123,7 +123,7 @@ fn shared_scale_m(results: &ResultSet, measured: &[(&StoneRow, &RowMotion)]) -> 
     if measured.is_empty() {
         nice_scale_m(results.distances.iter().map(|d| d.distance_m.abs()))
     } else {
-        component_limit_m(measured.iter().map(|(_, m)| *m))
+        component_limit_m(measured.iter().map(|(_, m)| *m), &results.thresholds())
     }
 }
 
@@ -143,18 +143,24 @@ fn verdict(results: &ResultSet) -> EpochVerdict {
         return verdict.clone();
     }
     let run = results.run.as_ref();
-    let name = |epoch: usize| {
-        run.and_then(|r| Some(r.epochs.get(epoch)?.name.clone()))
-            .unwrap_or_default()
-    };
-    let later = run
+    let epochs: Vec<(&str, Option<&str>)> = run
         .into_iter()
-        .flat_map(|r| r.epochs.iter().skip(1).map(|e| e.name.as_str()));
-    let later_name = name(results.pair);
-    let in_doubt = run.is_some_and(|r| is_doubted(&r.warnings, &later_name, later));
+        .flat_map(|r| r.epochs.iter().map(|e| (e.name.as_str(), e.date.as_deref())))
+        .collect();
+    let course = Course {
+        epochs: &epochs,
+        trends: results.trends.as_ref(),
+        stones: &results.courses,
+    };
+    let name = |epoch: usize| epochs.get(epoch).map_or("", |(name, _)| *name);
+    let pair = Pair {
+        epochs: [name(0), name(results.pair)],
+        in_doubt: run.is_some_and(|r| is_doubted(&r.warnings, name(results.pair), course.later())),
+        course: &course,
+    };
     let thresholds = run.map(|r| r.parameters.thresholds.clone()).unwrap_or_default();
     let language = run.map_or(Language::default(), |r| r.parameters.report.language);
-    verdict_on(results, [name(0), later_name], in_doubt, &thresholds, language)
+    verdict_on(results, &pair, &thresholds, language)
 }
 
 fn region(results: &ResultSet, moved: &[(&StoneRow, &RowMotion)]) -> Option<[Point2<f64>; 2]> {

@@ -12,6 +12,7 @@ pub(crate) use report::{
 pub(crate) use series::SeriesTexts;
 pub(crate) use stonewise_base::messages::fill;
 use stonewise_base::report_params::Language;
+use stonewise_base::thresholds::Quantity;
 use stonewise_figure::{Axis, count, mm, number, percent};
 use stonewise_results::Status;
 use stonewise_results::records::State;
@@ -59,12 +60,14 @@ pub(crate) struct Clauses {
     pub not_converged: &'static str,
     pub in_doubt: &'static str,
     pub apparent: Number,
-    pub moved_alarm: Number,
-    pub moved_attention: Number,
-    pub neighbours_alarm: Number,
-    pub neighbours_attention: Number,
-    pub joints_alarm: Number,
-    pub joints_attention: Number,
+    /// What lies beyond a threshold: motion, motion against neighbours, joint opening, deformation, velocity, departure.
+    beyond: [Number; 6],
+    /// Attention, alarm.
+    pub levels: [&'static str; 2],
+    pub rate_not_judged: &'static str,
+    pub departure_not_judged: &'static str,
+    pub mm_a_year: &'static str,
+    pub standard_deviations: &'static str,
     pub moved: Number,
     pub moved_common: Number,
     pub loose: Number,
@@ -83,8 +86,6 @@ pub(crate) struct Clauses {
     pub below_with_joints: Number,
     pub none_shown: &'static str,
     pub not_measured: Number,
-    pub deformed_alarm: Number,
-    pub deformed_attention: Number,
     pub deformed_reaches: Number,
     pub deformed: Number,
     /// The zone of the largest deformation, by what it resembles.
@@ -94,8 +95,8 @@ pub(crate) struct Clauses {
     limit: &'static str,
     limit_common: &'static str,
     pub or: &'static str,
-    /// Motion, motion against neighbours, joint opening.
-    pub quantities: [&'static str; 3],
+    /// What has thresholds.
+    pub quantities: [&'static str; 9],
     /// Outside the zones, and in zones that have no threshold of their own.
     pub elsewhere: &'static str,
 }
@@ -185,30 +186,37 @@ static ENGLISH: Texts = Texts {
             "as computed, {n} stone would lie beyond the alarm threshold",
             "as computed, {n} stones would lie beyond the alarm threshold",
         ],
-        moved_alarm: [
-            "{n} stone moved beyond the alarm threshold of {t}",
-            "{n} stones moved beyond the alarm threshold of {t}",
+        beyond: [
+            [
+                "{n} stone moved beyond the {level} threshold of {t}",
+                "{n} stones moved beyond the {level} threshold of {t}",
+            ],
+            [
+                "{n} stone moved against its neighbours beyond the {level} threshold of {t}",
+                "{n} stones moved against their neighbours beyond the {level} threshold of {t}",
+            ],
+            [
+                "{n} joint opened beyond the {level} threshold of {t}",
+                "{n} joints opened beyond the {level} threshold of {t}",
+            ],
+            [
+                "{n} zone deformed beyond the {level} threshold of {t}",
+                "{n} zones deformed beyond the {level} threshold of {t}",
+            ],
+            [
+                "{n} stone moves faster than the {level} threshold of {t}",
+                "{n} stones move faster than the {level} threshold of {t}",
+            ],
+            [
+                "{n} stone departs from what the series predicts beyond the {level} threshold of {t}",
+                "{n} stones depart from what the series predicts beyond the {level} threshold of {t}",
+            ],
         ],
-        moved_attention: [
-            "{n} stone moved beyond the attention threshold of {t}",
-            "{n} stones moved beyond the attention threshold of {t}",
-        ],
-        neighbours_alarm: [
-            "{n} stone moved against its neighbours beyond the alarm threshold of {t}",
-            "{n} stones moved against their neighbours beyond the alarm threshold of {t}",
-        ],
-        neighbours_attention: [
-            "{n} stone moved against its neighbours beyond the attention threshold of {t}",
-            "{n} stones moved against their neighbours beyond the attention threshold of {t}",
-        ],
-        joints_alarm: [
-            "{n} joint opened beyond the alarm threshold of {t}",
-            "{n} joints opened beyond the alarm threshold of {t}",
-        ],
-        joints_attention: [
-            "{n} joint opened beyond the attention threshold of {t}",
-            "{n} joints opened beyond the attention threshold of {t}",
-        ],
+        levels: ["attention", "alarm"],
+        rate_not_judged: "velocities cannot be compared with their thresholds: give the dates of both epochs, or of three in a series",
+        departure_not_judged: "departures from the model cannot be compared with their thresholds: a model takes four epochs with a date",
+        mm_a_year: "mm a year",
+        standard_deviations: "standard deviations",
         moved: [
             "{n} of {m} measured stones moved",
             "{n} of {m} measured stones moved",
@@ -260,14 +268,6 @@ static ENGLISH: Texts = Texts {
             "{n} of {m} stones was not measured",
             "{n} of {m} stones were not measured",
         ],
-        deformed_alarm: [
-            "{n} zone deformed beyond the alarm threshold of {t}",
-            "{n} zones deformed beyond the alarm threshold of {t}",
-        ],
-        deformed_attention: [
-            "{n} zone deformed beyond the attention threshold of {t}",
-            "{n} zones deformed beyond the attention threshold of {t}",
-        ],
         deformed_reaches: [
             "the deformation of {n} zone may have reached the attention threshold of {t}",
             "the deformations of {n} zones may have reached the attention threshold of {t}",
@@ -290,7 +290,17 @@ static ENGLISH: Texts = Texts {
         limit: "detection limit: {median} mm (median), {high} mm (90th percentile)",
         limit_common: "detection limit against the common motion: {median} mm (median), {high} mm (90th percentile)",
         or: "or",
-        quantities: ["motion", "against neighbours", "joint opening"],
+        quantities: [
+            "motion",
+            "out of the wall",
+            "up",
+            "along the wall",
+            "against neighbours",
+            "joint opening",
+            "deformation",
+            "velocity",
+            "departure from the model",
+        ],
         elsewhere: "rest of the wall",
     },
     page: PageTexts {
@@ -407,30 +417,37 @@ static GERMAN: Texts = Texts {
             "wie berechnet l\u{e4}ge {n} Stein \u{fc}ber der Alarmschwelle",
             "wie berechnet l\u{e4}gen {n} Steine \u{fc}ber der Alarmschwelle",
         ],
-        moved_alarm: [
-            "{n} Stein hat sich \u{fc}ber die Alarmschwelle von {t} hinaus bewegt",
-            "{n} Steine haben sich \u{fc}ber die Alarmschwelle von {t} hinaus bewegt",
+        beyond: [
+            [
+                "{n} Stein hat sich \u{fc}ber die {level} von {t} hinaus bewegt",
+                "{n} Steine haben sich \u{fc}ber die {level} von {t} hinaus bewegt",
+            ],
+            [
+                "{n} Stein hat sich gegen seine Nachbarn \u{fc}ber die {level} von {t} hinaus bewegt",
+                "{n} Steine haben sich gegen ihre Nachbarn \u{fc}ber die {level} von {t} hinaus bewegt",
+            ],
+            [
+                "{n} Fuge hat sich \u{fc}ber die {level} von {t} hinaus ge\u{f6}ffnet",
+                "{n} Fugen haben sich \u{fc}ber die {level} von {t} hinaus ge\u{f6}ffnet",
+            ],
+            [
+                "{n} Zone hat sich \u{fc}ber die {level} von {t} hinaus verformt",
+                "{n} Zonen haben sich \u{fc}ber die {level} von {t} hinaus verformt",
+            ],
+            [
+                "{n} Stein bewegt sich schneller als die {level} von {t}",
+                "{n} Steine bewegen sich schneller als die {level} von {t}",
+            ],
+            [
+                "{n} Stein weicht \u{fc}ber die {level} von {t} hinaus von der Vorhersage der Reihe ab",
+                "{n} Steine weichen \u{fc}ber die {level} von {t} hinaus von der Vorhersage der Reihe ab",
+            ],
         ],
-        moved_attention: [
-            "{n} Stein hat sich \u{fc}ber die Warnschwelle von {t} hinaus bewegt",
-            "{n} Steine haben sich \u{fc}ber die Warnschwelle von {t} hinaus bewegt",
-        ],
-        neighbours_alarm: [
-            "{n} Stein hat sich gegen seine Nachbarn \u{fc}ber die Alarmschwelle von {t} hinaus bewegt",
-            "{n} Steine haben sich gegen ihre Nachbarn \u{fc}ber die Alarmschwelle von {t} hinaus bewegt",
-        ],
-        neighbours_attention: [
-            "{n} Stein hat sich gegen seine Nachbarn \u{fc}ber die Warnschwelle von {t} hinaus bewegt",
-            "{n} Steine haben sich gegen ihre Nachbarn \u{fc}ber die Warnschwelle von {t} hinaus bewegt",
-        ],
-        joints_alarm: [
-            "{n} Fuge hat sich \u{fc}ber die Alarmschwelle von {t} hinaus ge\u{f6}ffnet",
-            "{n} Fugen haben sich \u{fc}ber die Alarmschwelle von {t} hinaus ge\u{f6}ffnet",
-        ],
-        joints_attention: [
-            "{n} Fuge hat sich \u{fc}ber die Warnschwelle von {t} hinaus ge\u{f6}ffnet",
-            "{n} Fugen haben sich \u{fc}ber die Warnschwelle von {t} hinaus ge\u{f6}ffnet",
-        ],
+        levels: ["Warnschwelle", "Alarmschwelle"],
+        rate_not_judged: "Geschwindigkeiten sind nicht mit ihren Schwellen vergleichbar: es fehlen die Daten beider Epochen oder, in einer Reihe, von dreien",
+        departure_not_judged: "Abweichungen vom Modell sind nicht mit ihren Schwellen vergleichbar: ein Modell braucht vier Epochen mit Datum",
+        mm_a_year: "mm im Jahr",
+        standard_deviations: "Standardabweichungen",
         moved: [
             "{n} von {m} gemessenen Steinen hat sich bewegt",
             "{n} von {m} gemessenen Steinen haben sich bewegt",
@@ -482,14 +499,6 @@ static GERMAN: Texts = Texts {
             "{n} von {m} Steinen wurde nicht gemessen",
             "{n} von {m} Steinen wurden nicht gemessen",
         ],
-        deformed_alarm: [
-            "{n} Zone hat sich \u{fc}ber die Alarmschwelle von {t} hinaus verformt",
-            "{n} Zonen haben sich \u{fc}ber die Alarmschwelle von {t} hinaus verformt",
-        ],
-        deformed_attention: [
-            "{n} Zone hat sich \u{fc}ber die Warnschwelle von {t} hinaus verformt",
-            "{n} Zonen haben sich \u{fc}ber die Warnschwelle von {t} hinaus verformt",
-        ],
         deformed_reaches: [
             "die Verformung von {n} Zone kann die Warnschwelle von {t} erreicht haben",
             "die Verformungen von {n} Zonen k\u{f6}nnen die Warnschwelle von {t} erreicht haben",
@@ -512,7 +521,17 @@ static GERMAN: Texts = Texts {
         limit: "Nachweisgrenze: {median} mm (Median), {high} mm (90. Perzentil)",
         limit_common: "Nachweisgrenze gegen die gemeinsame Bewegung: {median} mm (Median), {high} mm (90. Perzentil)",
         or: "oder",
-        quantities: ["Bewegung", "gegen Nachbarn", "Fugen\u{f6}ffnung"],
+        quantities: [
+            "Bewegung",
+            "aus der Mauer",
+            "nach oben",
+            "entlang der Mauer",
+            "gegen Nachbarn",
+            "Fugen\u{f6}ffnung",
+            "Verformung",
+            "Geschwindigkeit",
+            "Abweichung vom Modell",
+        ],
         elsewhere: "\u{fc}brige Mauer",
     },
     page: PageTexts {
@@ -633,6 +652,19 @@ static CONDITIONS: [(&str, &str); 14] = [
 ];
 
 impl Clauses {
+    /// What lies beyond a threshold of a quantity; `{level}` is one of the levels.
+    pub(crate) fn beyond(&self, quantity: Quantity) -> Number {
+        let [motion, neighbours, joints, deformation, rate, departure] = self.beyond;
+        match quantity {
+            Quantity::Length | Quantity::Out | Quantity::Up | Quantity::Along => motion,
+            Quantity::Neighbours => neighbours,
+            Quantity::Joints => joints,
+            Quantity::Deformation => deformation,
+            Quantity::Rate => rate,
+            Quantity::Departure => departure,
+        }
+    }
+
     /// The detection limit: of absolute motions, or of those against the common motion of the wall.
     pub(crate) fn detection_limit(&self, has_datum: bool) -> &'static str {
         if has_datum { self.limit } else { self.limit_common }
@@ -712,6 +744,16 @@ impl Texts {
         }
     }
 
+    /// A threshold with its unit.
+    pub(crate) fn limit(&self, quantity: Quantity, limit: f64) -> String {
+        let unit = match quantity {
+            Quantity::Rate => self.clauses.mm_a_year,
+            Quantity::Departure => self.clauses.standard_deviations,
+            _ => "mm",
+        };
+        format!("{} {unit}", self.threshold(limit))
+    }
+
     /// A threshold in millimetres, as short as it can be.
     pub(crate) fn threshold(&self, millimetres: f64) -> String {
         let rounded = (millimetres * 1e3).round() / 1e3;
@@ -773,7 +815,11 @@ mod tests {
     fn one_and_many_are_told_apart() {
         let clauses = &Texts::of(Language::English).clauses;
         assert_eq!(
-            counted(clauses.joints_alarm, 1, &[("t", "5 mm")]),
+            counted(
+                clauses.beyond(Quantity::Joints),
+                1,
+                &[("t", "5 mm"), ("level", clauses.levels[1])]
+            ),
             "1 joint opened beyond the alarm threshold of 5 mm"
         );
         assert!(counted(clauses.lost, 2, &[]).starts_with("2 stones are lost"));

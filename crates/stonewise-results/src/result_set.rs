@@ -9,13 +9,14 @@ use super::records::{
     Datum, InstrumentsRecord, RegistrationRecord, Remarks, RunRecord, TrendsRecord, Verdict,
 };
 use super::stone_table::read_stones;
-use super::{Evidence, Facade, RowMotion, StoneRow, read_neighbours, read_velocities};
+use super::{Evidence, Facade, RowMotion, StoneCourse, StoneRow, read_courses, read_neighbours};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_base::error::Error;
 use stonewise_base::files::is_there;
+use stonewise_base::thresholds::Thresholds;
 use stonewise_core::evaluate::Evaluation;
 use stonewise_core::geometry::FaceFrame;
 use stonewise_core::stone::NeighbourCovariance;
@@ -52,8 +53,8 @@ pub struct ResultSet {
     pub verdict: Option<Verdict>,
     /// `trends.json`, where there are more than two epochs.
     pub trends: Option<TrendsRecord>,
-    /// Velocities by stone, along the wall, up and out, from `trends.parquet`; metres a year.
-    pub velocities: BTreeMap<u32, Vector3<f64>>,
+    /// What stones do over time, by stone, from `trends.parquet`.
+    pub courses: BTreeMap<u32, StoneCourse>,
     /// `instruments.json`, where the project names instruments.
     pub instruments: Option<InstrumentsRecord>,
     /// Decisions about mask instances by epoch, from `audit_epochN.csv`: rows of event, photo, instance,
@@ -95,7 +96,7 @@ impl ResultSet {
             remarks,
             verdict: read_json(&dir.join(VERDICT))?,
             trends: read_json(&dir.join(TRENDS))?,
-            velocities: read_velocities(dir)?,
+            courses: read_courses(dir)?,
             instruments: read_json(&dir.join(INSTRUMENTS))?,
             decisions: read_decisions(dir)?,
             edits: read_rows(&dir.join(EDITS_AUDIT))?.unwrap_or_default(),
@@ -110,6 +111,21 @@ impl ResultSet {
     /// # Errors
     /// As [`Self::read_pair`].
     pub fn read_measured(dir: &Path, pair: usize) -> Result<Self, Error> {
+        let core = read_distance_points(&dir.join(PairFile::M3c2Csv.place(pair)))?;
+        Ok(Self {
+            distances: core.distances,
+            without_distance: core.without_distance,
+            evaluation: read_json(&dir.join(PairFile::Evaluation.place(pair)))?,
+            neighbours: read_neighbours(dir, pair)?,
+            ..Self::read_motions(dir, pair)?
+        })
+    }
+
+    /// Reads the stones of a pair with their outlines and registration, and the record of the run.
+    ///
+    /// # Errors
+    /// As [`Self::read_pair`].
+    pub(super) fn read_motions(dir: &Path, pair: usize) -> Result<Self, Error> {
         let path = dir.join(PairFile::StonesParquet.place(pair));
         if !is_there(&path)? {
             stones_in(dir)?;
@@ -119,19 +135,13 @@ impl ResultSet {
         stones.sort_by_key(|s| s.stone_id);
         let outlines = read_outlines(dir)?;
         let facade: Option<Facade> = read_json(&dir.join(FACADE))?;
-        let core = read_distance_points(&dir.join(PairFile::M3c2Csv.place(pair)))?;
-
         let facade =
             facade.unwrap_or_else(|| facade_of(stones.iter().map(|s| (s.stone_id, s.centroid)), &outlines));
         Ok(Self {
             pair,
             pairs: pairs_in(dir)?,
-            distances: core.distances,
-            without_distance: core.without_distance,
-            evaluation: read_json(&dir.join(PairFile::Evaluation.place(pair)))?,
             run: read_json(&dir.join(RUN))?,
             registration: read_json(&dir.join(PairFile::Registration.place(pair)))?,
-            neighbours: read_neighbours(dir, pair)?,
             ..Self::of_stones(stones, outlines, facade)
         })
     }
@@ -152,7 +162,7 @@ impl ResultSet {
             neighbours: Vec::new(),
             verdict: None,
             trends: None,
-            velocities: BTreeMap::new(),
+            courses: BTreeMap::new(),
             instruments: None,
             decisions: Vec::new(),
             edits: Vec::new(),
@@ -166,6 +176,12 @@ impl ResultSet {
     /// What is known about the registration of the later epoch; `None` where `registration.json` is missing.
     pub fn datum(&self) -> Option<&Datum> {
         self.registration.as_ref().map(|r| &r.datum)
+    }
+
+    /// The thresholds of the verdict; none where there is no verdict.
+    pub fn thresholds(&self) -> Thresholds {
+        let verdict = self.verdict.as_ref();
+        verdict.map(|v| v.thresholds.clone()).unwrap_or_default()
     }
 
     /// Measured stones with their motion.

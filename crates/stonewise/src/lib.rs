@@ -63,7 +63,7 @@ pub use stonewise_report as report;
 pub use stonewise_results as results;
 pub use stonewise_results::export;
 pub use storage::step::set_program;
-pub use thresholds::{Levels, Measures, Thresholds, Zone};
+pub use thresholds::{Level, Quantity, Threshold, Thresholds, Zone};
 pub use truth::evaluate_truth;
 pub use verify::{Answer, Finding, Maker, Verification, verify};
 pub use warnings::Warning;

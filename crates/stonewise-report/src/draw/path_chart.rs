@@ -2,7 +2,6 @@
 
 use crate::texts::Texts;
 use std::fmt::Write;
-use stonewise_base::thresholds::Levels;
 use stonewise_figure::{Axes, Axis, escape};
 use stonewise_results::calendar::year_of;
 use stonewise_results::records::{ConditionRecord, CurvePoint, EstimateRecord, ZoneTrend};
@@ -27,7 +26,7 @@ pub(crate) struct PathChart<'a> {
     /// Labels of the panels: along the wall, up, out.
     pub labels: [&'a str; 3],
     pub conditions: &'a [ConditionRecord],
-    pub thresholds: Levels,
+    pub limits_mm: &'a [f64],
     pub texts: &'a Texts,
 }
 
@@ -118,18 +117,13 @@ impl PathChart<'_> {
         let reach = FARTHEST_THRESHOLD * high.max(-low);
         let of = |mm: &f64| *mm <= reach;
         let highest = self
-            .thresholds_mm()
+            .limits_mm
             .iter()
             .copied()
             .filter(|mm| of(mm))
             .fold(0.0, f64::max);
         let margin = 0.04 * (high.max(highest) - low.min(-highest));
         [low.min(-highest) - margin, high.max(highest) + margin]
-    }
-
-    fn thresholds_mm(&self) -> Vec<f64> {
-        let both = [self.thresholds.attention_mm, self.thresholds.alarm_mm];
-        both.into_iter().flatten().collect()
     }
 
     fn draw_motion(&self, axes: &Axes, component: usize, out: &mut String) {
@@ -139,8 +133,8 @@ impl PathChart<'_> {
             r#"<path class="zero" d="M{left} {:.1}h{width:.1}"/>"#,
             axes.py(0.0)
         );
-        let thresholds = self.thresholds_mm();
-        let lines = thresholds
+        let lines = self
+            .limits_mm
             .iter()
             .flat_map(|mm| [-mm, *mm])
             .filter(|mm| axes.y.holds(*mm));
@@ -289,10 +283,7 @@ mod tests {
             zone: &zone,
             labels: ["along", "up", "out"],
             conditions: &conditions,
-            thresholds: Levels {
-                attention_mm: Some(3.0),
-                alarm_mm: Some(60.0),
-            },
+            limits_mm: &[3.0, 60.0],
             texts: Texts::of(Language::English),
         });
         assert!(svg.contains("Zone &lt;1&gt;") && svg.contains("level_m") && !svg.contains("NaN"));

@@ -181,6 +181,7 @@ mod tests {
         let joint = |stones, state| JointVerdict {
             stones,
             state,
+            decided_by: None,
             opening_mm: 6.0,
             interval_mm: [5.5, 6.5],
             q: 0.001,

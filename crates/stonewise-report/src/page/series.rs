@@ -6,6 +6,7 @@ use crate::summary::Summary;
 use crate::texts::{SeriesTexts, Texts, counted, fill};
 use crate::verdict::term_name;
 use std::fmt::Write;
+use stonewise_base::thresholds::Quantity;
 use stonewise_core::series::Word;
 use stonewise_figure::{Scale, escape};
 use stonewise_results::records::{AnswerVerdict, EstimateRecord, SeriesVerdict, ZoneTrend};
@@ -91,10 +92,10 @@ pub(super) fn paths(results: &ResultSet, texts: &Texts) -> String {
         return String::new();
     };
     let thresholds = results.run.as_ref().map(|run| &run.parameters.thresholds);
-    let levels = thresholds.map(|t| match t.deformation.is_empty() {
-        true => t.wall.length,
-        false => t.deformation,
-    });
+    let limits = thresholds
+        .into_iter()
+        .flat_map(|t| t.of(Quantity::Deformation, None));
+    let limits_mm: Vec<f64> = limits.map(|t| t.limit).collect();
 
     let one = |zone: &ZoneTrend| {
         let title = fill(
@@ -106,7 +107,7 @@ pub(super) fn paths(results: &ResultSet, texts: &Texts) -> String {
             zone,
             labels: names.components,
             conditions: &trends.conditions,
-            thresholds: levels.unwrap_or_default(),
+            limits_mm: &limits_mm,
             texts,
         });
         figure(
@@ -169,17 +170,17 @@ fn path_in_words(zone: &ZoneTrend, texts: &Texts) -> String {
 
 /// How fast every stone moves.
 pub(super) fn map(results: &ResultSet, facts: &Summary) -> String {
-    if results.velocities.is_empty() {
+    if results.courses.is_empty() {
         return String::new();
     }
     let names = facts.texts().series;
     let layout = MapLayout::new(results, facts.texts());
-    let speed = |s: &StoneRow| results.velocities.get(&s.stone_id).map(|v| v.norm());
+    let speed = |s: &StoneRow| results.courses.get(&s.stone_id).map(|c| c.velocity.norm());
     let picture = MapPicture {
         title: names.map,
         value: &speed,
         unit: names.map_unit,
-        scale: Scale::Sequential(nice_scale_m(results.velocities.values().map(|v| v.norm()))),
+        scale: Scale::Sequential(nice_scale_m(results.courses.values().map(|c| c.velocity.norm()))),
         strong: None,
         arrows: false,
         loose: false,

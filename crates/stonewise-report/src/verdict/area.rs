@@ -1,9 +1,9 @@
 //! The state and the numbers of the wall or of a zone.
 
 use super::case::Case;
-use super::judged::{Judged, JudgedStone, Level, deformed, millimetres};
+use super::judged::{Finding, Judged, JudgedStone, Outcome, millimetres};
 use std::collections::BTreeMap;
-use stonewise_base::thresholds::Thresholds;
+use stonewise_base::thresholds::{Level, Quantity, Thresholds};
 use stonewise_results::Sorted;
 use stonewise_results::records::{Area, DetectionLimit, Largest, ReasonCode, State};
 
@@ -34,6 +34,9 @@ pub(super) fn area(case: &Case, thresholds: &Thresholds, judged: &Judged, zone: 
 
     Area {
         state: reasons.first().map_or(State::CannotTell, |r| state_of(*r)),
+        decided_by: reasons
+            .first()
+            .and_then(|r| judged.findings_in(zone).find(|f| gives(f, *r))?.decision()),
         reasons,
         stones: stones().count(),
         measured: count(|s| s.verdict.length_mm.is_some()),
@@ -82,22 +85,33 @@ fn largest_of(
 pub(super) fn state_of(reason: ReasonCode) -> State {
     use ReasonCode as R;
     match reason {
-        R::LengthAlarm | R::NeighboursAlarm | R::JointsAlarm | R::DeformationAlarm => State::Alarm,
-        R::LengthAttention
-        | R::NeighboursAttention
-        | R::JointsAttention
-        | R::DeformationAttention
-        | R::StonesLost
-        | R::MotionShown
-        | R::DeformationShown => State::Attention,
+        R::Alarm(_) => State::Alarm,
+        R::Attention(_) | R::StonesLost | R::MotionShown | R::DeformationShown => State::Attention,
         R::BelowThresholds | R::NoMotionShown => State::Fine,
         R::NotConverged
         | R::InDoubt
         | R::NothingMeasured
         | R::FewMeasured
         | R::DatumUnknown
+        | R::NotJudged(_)
         | R::IntervalReachesThreshold
         | R::DeformationReachesThreshold => State::CannotTell,
+    }
+}
+
+/// Whether a finding is one of those that a reason names.
+pub(super) fn gives(finding: &Finding, reason: ReasonCode) -> bool {
+    use ReasonCode as R;
+    let is = |quantity, outcome| finding.quantity == quantity && finding.outcome == outcome;
+    match reason {
+        R::Alarm(quantity) => is(quantity, Outcome::Beyond(Level::Alarm)),
+        R::Attention(quantity) => is(quantity, Outcome::Beyond(Level::Attention)),
+        R::NotJudged(quantity) => is(quantity, Outcome::NotJudged),
+        R::DeformationReachesThreshold => is(Quantity::Deformation, Outcome::Reaches),
+        R::IntervalReachesThreshold => {
+            finding.quantity != Quantity::Deformation && finding.outcome == Outcome::Reaches
+        }
+        _ => false,
     }
 }
 
@@ -110,46 +124,35 @@ fn reason_codes(
 ) -> Vec<ReasonCode> {
     use ReasonCode as R;
     let stones = || judged.stones_in(zone);
-    let joints = || judged.joints_in(zone);
-    let length = |level: Level| stones().any(|s| s.length == level);
-    let neighbours = |level: Level| stones().any(|s| s.neighbours == level);
-    let opening = |level: Level| joints().any(|j| j.opening == level);
-    let of_wall = zone.is_none();
-    let deformation = |level: Level| {
-        let zones = judged.deformed_zones();
-        of_wall && zones.iter().any(|z| deformed(z, thresholds) == level)
-    };
+    let found = |reason: R| (judged.findings_in(zone).any(|f| gives(f, reason)), reason);
     let without = thresholds.is_empty();
     let measured = stones().filter(|s| s.verdict.length_mm.is_some()).count();
     let share = measured as f64 / stones().count().max(1) as f64;
-
-    let length_matters = without
-        || match zone {
-            Some(_) => !thresholds.measures(zone).length.is_empty(),
-            None => stones().any(|s| !thresholds.measures(s.zone).length.is_empty()),
-        };
-    let reaches = length(Level::Reaches) || neighbours(Level::Reaches) || opening(Level::Reaches);
+    let datum_matters = stones().any(|s| case.needs_datum(thresholds, s.zone));
     let shown = stones().any(|s| s.verdict.moved || s.verdict.loose);
-    let all = [
-        (case.not_converged, R::NotConverged),
-        (case.in_doubt, R::InDoubt),
-        (length(Level::Alarm), R::LengthAlarm),
-        (neighbours(Level::Alarm), R::NeighboursAlarm),
-        (opening(Level::Alarm), R::JointsAlarm),
-        (deformation(Level::Alarm), R::DeformationAlarm),
-        (length(Level::Attention), R::LengthAttention),
-        (neighbours(Level::Attention), R::NeighboursAttention),
-        (opening(Level::Attention), R::JointsAttention),
-        (deformation(Level::Attention), R::DeformationAttention),
+    let deformed = zone.is_none() && !judged.deformed_zones().is_empty();
+    let not_judged = |quantity| {
+        let asked = judged.findings_in(zone).filter(|f| f.quantity == quantity);
+        let missing = asked.clone().filter(|f| f.outcome == Outcome::NotJudged).count();
+        (
+            missing as f64 > LEAST_MEASURED * asked.count() as f64,
+            R::NotJudged(quantity),
+        )
+    };
+
+    let mut all = vec![(case.not_converged, R::NotConverged), (case.in_doubt, R::InDoubt)];
+    all.extend(Quantity::ALL.map(|q| found(R::Alarm(q))));
+    all.extend(Quantity::ALL.map(|q| found(R::Attention(q))));
+    all.extend([
         (without && shown, R::MotionShown),
-        (without && deformation(Level::NotAsked), R::DeformationShown),
+        (without && deformed, R::DeformationShown),
         (stones().any(|s| s.verdict.lost), R::StonesLost),
         (measured == 0, R::NothingMeasured),
         (measured > 0 && share < LEAST_MEASURED, R::FewMeasured),
-        (length_matters && !case.has_datum(), R::DatumUnknown),
-        (reaches, R::IntervalReachesThreshold),
-        (deformation(Level::Reaches), R::DeformationReachesThreshold),
-    ];
+        (datum_matters && !case.has_datum(), R::DatumUnknown),
+    ]);
+    all.extend([Quantity::Rate, Quantity::Departure].map(not_judged));
+    all.extend([R::IntervalReachesThreshold, R::DeformationReachesThreshold].map(found));
 
     let mut codes: Vec<R> = all
         .into_iter()

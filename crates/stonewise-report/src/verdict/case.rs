@@ -1,7 +1,9 @@
 //! What the verdict is drawn from.
 
 use super::interval::Estimate;
+use super::judged::Compared;
 use nalgebra::Point2;
+use stonewise_base::thresholds::{Quantity, Thresholds};
 use stonewise_results::records::{DatumState, DeformationVerdict};
 
 /// What is known of one pair of epochs.
@@ -15,12 +17,31 @@ pub(crate) struct Case {
     pub not_converged: bool,
     /// There is a doubt about the run as a whole.
     pub in_doubt: bool,
+    /// What is known of time.
+    pub time: TimeCase,
     /// The stones of the first epoch.
     pub stones: Vec<StoneCase>,
     /// The joints whose stones were both measured.
     pub joints: Vec<JointCase>,
     /// Whether and where the wall changed its shape, where that was asked; states of its zones are left open.
     pub deformation: Option<DeformationVerdict>,
+}
+
+/// What is known of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum TimeCase {
+    /// There are two epochs, so many years apart; `None` where a date is missing.
+    Pair(Option<f64>),
+    /// The pair of the newest epoch of a series, with which velocities and departures are judged.
+    Newest,
+    /// The pair of another epoch.
+    Earlier,
+}
+
+impl Default for TimeCase {
+    fn default() -> Self {
+        Self::Pair(None)
+    }
 }
 
 /// What is known of a stone.
@@ -35,12 +56,16 @@ pub(crate) struct StoneCase {
     pub is_masonry: bool,
     /// What was measured.
     pub measured: Option<StoneMeasured>,
+    /// Its velocity in a series, millimetres a year.
+    pub rate: Option<Compared>,
+    /// The departure of the newest epoch from what a series predicts, standard deviations.
+    pub departure: Option<Compared>,
 }
 
 /// The measured motion of a stone.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StoneMeasured {
-    /// The motion that is tested, see the stone table.
+    /// The motion that is tested, see the stone table, as (along, up, out).
     pub motion: Estimate,
     /// The motion against the neighbours.
     pub neighbours: Estimate,
@@ -73,6 +98,14 @@ impl Case {
         let shape_kept = self.deformation.as_ref().is_some_and(|found| !found.shown);
         let stays = shape_kept && stone.shape_tested && !stone.loose;
         self.has_datum() || !stays
+    }
+
+    /// Whether a motion of the wall as a whole would reach thresholds of this zone, or of the wall outside all zones.
+    pub(super) fn needs_datum(&self, thresholds: &Thresholds, zone: Option<usize>) -> bool {
+        use Quantity as Q;
+        let of_pair = matches!(self.time, TimeCase::Pair(_)).then_some(Q::Rate);
+        let mut absolute = [Q::Length, Q::Out, Q::Up, Q::Along].into_iter().chain(of_pair);
+        thresholds.is_empty() || absolute.any(|q| thresholds.of(q, zone).next().is_some())
     }
 
     /// Whether intervals hold the registration error, so that they say something about the wall as a whole.

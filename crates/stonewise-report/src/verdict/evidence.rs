@@ -5,6 +5,7 @@ use super::case::{Case, JointCase, StoneCase, StoneMeasured};
 use super::interval::Estimate;
 use super::judged::millimetres;
 use super::lost::lost_stones;
+use super::time::Course;
 use nalgebra::{Point2, Vector3, center};
 use stonewise_base::report_params::Language;
 use stonewise_base::thresholds::Thresholds;
@@ -13,12 +14,20 @@ use stonewise_core::registration::DeformationZone;
 use stonewise_results::records::{DatumState, DeformationVerdict, DeformedZone, EpochVerdict, State};
 use stonewise_results::{Joint, ResultSet, RowMotion, Status, StoneRow, ZonePlace, joints};
 
-/// The verdict on the pair of epochs of these results. `in_doubt`: there is a doubt about the run as a whole;
-/// `epochs`: their names.
+/// What the verdict on a pair of epochs is drawn from beside the results of the pair.
+pub struct Pair<'a> {
+    /// Names of the two epochs.
+    pub epochs: [&'a str; 2],
+    /// There is a doubt about the run as a whole.
+    pub in_doubt: bool,
+    /// All epochs in time.
+    pub course: &'a Course<'a>,
+}
+
+/// The verdict on the pair of epochs of these results.
 pub fn verdict_on(
     results: &ResultSet,
-    epochs: [String; 2],
-    in_doubt: bool,
+    pair: &Pair,
     thresholds: &Thresholds,
     language: Language,
 ) -> EpochVerdict {
@@ -27,28 +36,31 @@ pub fn verdict_on(
         .as_ref()
         .is_none_or(|r| r.estimator.converged());
     let case = Case {
-        epochs,
+        epochs: pair.epochs.map(str::to_owned),
         datum: results.datum().map(|d| d.state),
         not_converged: !converged,
-        in_doubt,
-        stones: stones(results),
+        in_doubt: pair.in_doubt,
+        time: pair.course.of_pair(pair.epochs[1]),
+        stones: stones(results, pair.course),
         joints: joints(results).iter().filter_map(|j| joint(results, j)).collect(),
         deformation: deformation(results),
     };
     assess(&case, thresholds, language)
 }
 
-fn stones(results: &ResultSet) -> Vec<StoneCase> {
+fn stones(results: &ResultSet, course: &Course) -> Vec<StoneCase> {
     let tested = Tested::of(results);
     let stone = |(stone, lost): (&StoneRow, bool)| StoneCase {
         stone_id: stone.stone_id,
         place: Point2::new(stone.along_m, stone.up_m),
         lost,
         is_masonry: stone.status != Status::NotMasonry,
+        rate: course.rate(stone.stone_id),
+        departure: course.departure(stone.stone_id),
         measured: stone.motion.as_ref().map(|motion| StoneMeasured {
             motion: Estimate {
-                vector: tested.motion(stone, motion),
-                covariance: motion.covariance,
+                vector: results.world_from_face(stone).transpose() * tested.motion(stone, motion),
+                covariance: results.face_covariance(stone, motion),
             },
             neighbours: Estimate {
                 vector: motion.relative,
@@ -99,6 +111,7 @@ fn deformation(results: &ResultSet) -> Option<DeformationVerdict> {
         Some(DeformedZone {
             zone_id: zone.number,
             state: State::default(),
+            decided_by: None,
             kind: zone.kind,
             along_m: millimetres(place.middle_m[0]) / 1e3,
             up_m: millimetres(place.middle_m[1]) / 1e3,
@@ -165,13 +178,23 @@ mod tests {
     use super::*;
     use crate::testing::{folder, registration_record, rows};
     use nalgebra::Vector6;
+    use std::collections::BTreeMap;
     use stonewise_base::files::write_json;
     use stonewise_core::geometry::lever;
     use stonewise_results::records::{Datum, EstimatorRecord, RegistrationRecord};
 
     fn judged(results: &ResultSet) -> EpochVerdict {
-        let epochs = ["A".to_owned(), "B".to_owned()];
-        verdict_on(results, epochs, false, &Thresholds::default(), Language::English)
+        let course = Course {
+            epochs: &[("A", None), ("B", None)],
+            trends: None,
+            stones: &BTreeMap::new(),
+        };
+        let pair = Pair {
+            epochs: ["A", "B"],
+            in_doubt: false,
+            course: &course,
+        };
+        verdict_on(results, &pair, &Thresholds::default(), Language::English)
     }
 
     /// Results whose stones all made one more rigid motion; `recorded`: whether the record contains it.

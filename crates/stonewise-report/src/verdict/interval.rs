@@ -47,6 +47,12 @@ impl Estimate {
         }
     }
 
+    /// Ends of the 95 % interval of a component, metres.
+    pub(crate) fn component_interval(&self, axis: usize) -> [f64; 2] {
+        let half = QUANTILE * self.covariance[(axis, axis)].max(0.0).sqrt();
+        [self.vector[axis] - half, self.vector[axis] + half]
+    }
+
     /// Probability of a vector as unlikely as this one if nothing had moved: chi-square with three degrees of
     /// freedom.
     pub(crate) fn p_value(&self) -> f64 {

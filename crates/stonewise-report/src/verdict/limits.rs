@@ -2,74 +2,52 @@
 
 use crate::texts::Texts;
 use std::collections::{BTreeMap, BTreeSet};
-use stonewise_base::thresholds::{Levels, Measures, Thresholds};
+use stonewise_base::thresholds::{Level, Quantity, Threshold, Thresholds};
 
-/// What has thresholds of its own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Quantity {
-    /// The length of a stone's motion.
-    Length,
-    /// The length of its motion against its neighbours.
-    Neighbours,
-    /// The opening of a joint.
-    Joints,
-}
+/// A threshold that something is compared with, and where: in a zone, or on the wall outside all zones.
+pub(super) type Placed = (Threshold, Option<usize>);
 
-/// Where a quantity is compared with thresholds: the zone of each of its stones or joints.
-#[derive(Clone, Debug)]
-pub(super) struct Compared {
-    pub quantity: Quantity,
-    pub zones: Vec<Option<usize>>,
-}
-
-/// One threshold of a quantity and the zones that it holds in.
-struct Limit {
-    quantity: Quantity,
-    micrometres: i64,
-    zones: BTreeSet<Option<usize>>,
-}
-
-impl Quantity {
-    /// All quantities.
-    pub(super) const ALL: [Self; 3] = [Self::Length, Self::Neighbours, Self::Joints];
-
-    /// The thresholds of the quantity.
-    pub(super) fn of(self, measures: &Measures) -> Levels {
-        match self {
-            Self::Length => measures.length,
-            Self::Neighbours => measures.neighbours,
-            Self::Joints => measures.joints,
-        }
-    }
+/// The thresholds at which attention begins: of every quantity of stones and joints in every one of these zones.
+pub(super) fn of_attention(thresholds: &Thresholds, zones: &BTreeSet<Option<usize>>) -> Vec<Placed> {
+    let quantities = Quantity::ALL.into_iter().filter(|q| *q != Quantity::Deformation);
+    let first = |(quantity, zone): (Quantity, Option<usize>)| {
+        let all = thresholds.of(quantity, zone);
+        let level = all.clone().map(|t| t.level).min().unwrap_or(Level::Alarm);
+        let first: Vec<Placed> = all.filter(|t| t.level == level).map(|t| (t, zone)).collect();
+        first
+    };
+    quantities
+        .flat_map(|quantity| zones.iter().map(move |zone| (quantity, *zone)))
+        .flat_map(first)
+        .collect()
 }
 
 /// The thresholds that are compared with, such as "5 mm" or "6 mm (crest) or 20 mm (rest of the wall)"; the
-/// quantity is named where thresholds of several quantities differ, the zones where a quantity's thresholds
-/// differ on the wall.
-pub(super) fn in_words(
-    thresholds: &Thresholds,
-    compared: &[Compared],
-    threshold: fn(&Levels) -> Option<f64>,
-    texts: &Texts,
-) -> String {
-    let limits: Vec<Limit> = compared
-        .iter()
-        .flat_map(|compared| limits(thresholds, compared, threshold))
-        .collect();
-    let differ = |a: &Limit, b: &Limit| a.micrometres != b.micrometres && a.quantity != b.quantity;
-    let several = limits.iter().any(|a| limits.iter().any(|b| differ(a, b)));
+/// quantity is named where thresholds of several quantities differ, and where it is more than a length, the zones where a
+/// quantity's thresholds differ on the wall.
+pub(super) fn in_words(thresholds: &Thresholds, compared: &[Placed], texts: &Texts) -> String {
+    let mut limits: BTreeMap<(Quantity, i64), BTreeSet<Option<usize>>> = BTreeMap::new();
+    for (threshold, zone) in compared {
+        let thousandths = (threshold.limit * 1e3).round() as i64;
+        let zones = limits.entry((threshold.quantity, thousandths)).or_default();
+        zones.insert(*zone);
+    }
+    let differ = |a: &(Quantity, i64), b: &(Quantity, i64)| a.0 != b.0 && a.1 != b.1;
+    let several = limits.keys().any(|a| limits.keys().any(|b| differ(a, b)));
     let mut words: Vec<String> = Vec::new();
 
-    for limit in &limits {
-        let names: Vec<String> = several
-            .then(|| texts.clauses.quantities[limit.quantity as usize].to_owned())
+    for ((quantity, thousandths), zones) in &limits {
+        use Quantity::{Along, Out, Up};
+        let is_named = several || matches!(quantity, Out | Up | Along);
+        let names: Vec<String> = is_named
+            .then(|| texts.clauses.quantities[*quantity as usize].to_owned())
             .into_iter()
-            .chain(zone_names(thresholds, limit, threshold, texts))
+            .chain(zone_names(thresholds, *quantity, zones, texts))
             .collect();
-        let mm = format!("{} mm", texts.threshold(limit.micrometres as f64 / 1e3));
+        let limit = texts.limit(*quantity, *thousandths as f64 / 1e3);
         let word = match names.is_empty() {
-            true => mm,
-            false => format!("{mm} ({})", names.join(", ")),
+            true => limit,
+            false => format!("{limit} ({})", names.join(", ")),
         };
         if !words.contains(&word) {
             words.push(word);
@@ -83,41 +61,30 @@ pub(super) fn in_words(
     }
 }
 
-/// The thresholds of one quantity, ascending.
-fn limits(thresholds: &Thresholds, compared: &Compared, threshold: fn(&Levels) -> Option<f64>) -> Vec<Limit> {
-    let mut zones: BTreeMap<i64, BTreeSet<Option<usize>>> = BTreeMap::new();
-    for zone in &compared.zones {
-        let levels = compared.quantity.of(&thresholds.measures(*zone));
-        if let Some(m) = threshold(&levels) {
-            let micrometres = (m * 1e6).round() as i64;
-            zones.entry(micrometres).or_default().insert(*zone);
-        }
-    }
-    let limit = |(micrometres, zones)| Limit {
-        quantity: compared.quantity,
-        micrometres,
-        zones,
-    };
-    zones.into_iter().map(limit).collect()
-}
-
-/// Names of the zones of a limit; none where the threshold is the same on the whole wall.
+/// Names of the zones of a limit; none where the thresholds of its quantity are the same on the whole wall.
 fn zone_names(
     thresholds: &Thresholds,
-    limit: &Limit,
-    threshold: fn(&Levels) -> Option<f64>,
+    quantity: Quantity,
+    zones: &BTreeSet<Option<usize>>,
     texts: &Texts,
 ) -> Vec<String> {
-    let of = |measures: &Measures| threshold(&limit.quantity.of(measures));
-    let wall = of(&thresholds.wall);
-    if thresholds.zones.iter().all(|zone| of(&zone.measures) == wall) {
+    let is_as_elsewhere = |zone: usize| {
+        thresholds
+            .of(quantity, Some(zone))
+            .eq(thresholds.of(quantity, None))
+    };
+    let all = thresholds.zones();
+    if (0..all.len()).all(is_as_elsewhere) {
         return Vec::new();
     }
-    if limit.zones.contains(&None) {
+    if zones.contains(&None) {
         return vec![texts.clauses.elsewhere.to_owned()];
     }
-    let names = limit.zones.iter().flatten();
-    names.map(|zone| thresholds.zones[*zone].name.clone()).collect()
+    zones
+        .iter()
+        .flatten()
+        .map(|zone| all[*zone].name.clone())
+        .collect()
 }
 
 #[cfg(test)]
@@ -125,21 +92,19 @@ mod tests {
     use super::*;
     use stonewise_base::report_params::Language;
 
-    fn said(text: &str, compared: &[(Quantity, &[Option<usize>])], language: Language) -> String {
+    fn said(text: &str, quantities: &[Quantity], zones: &[Option<usize>], language: Language) -> String {
         let thresholds: Thresholds = toml::from_str(text).unwrap();
-        let compared: Vec<Compared> = compared
-            .iter()
-            .map(|(quantity, zones)| Compared {
-                quantity: *quantity,
-                zones: zones.to_vec(),
-            })
+        let all = of_attention(&thresholds, &zones.iter().copied().collect());
+        let compared: Vec<Placed> = all
+            .into_iter()
+            .filter(|(t, _)| quantities.contains(&t.quantity))
             .collect();
-        in_words(&thresholds, &compared, Levels::attention_m, Texts::of(language))
+        in_words(&thresholds, &compared, Texts::of(language))
     }
 
     #[test]
     fn a_threshold_names_its_quantity_and_its_zones_only_where_they_tell_it_apart() {
-        use Quantity::{Joints, Length, Neighbours};
+        use Quantity::{Joints, Length, Neighbours, Out, Rate};
         let zone = |name: &str, keys: &str| {
             format!("[[zones]]\nname = \"{name}\"\npolygon = [[0, 0], [1, 0], [1, 1]]\n{keys}\n")
         };
@@ -151,33 +116,53 @@ mod tests {
         );
         let all: &[Option<usize>] = &[Some(2), Some(1), Some(0), None, Some(0)];
         let three = "attention_mm = 5\nneighbours = { attention_mm = 2.5 }\njoints = { attention_mm = 2 }";
-        let every: [(Quantity, &[Option<usize>]); 3] = [(Length, all), (Neighbours, all), (Joints, all)];
-        for (text, compared, expected) in [
-            ("attention_mm = 5", &every[..1], "5 mm"),
+        let every = [Length, Neighbours, Joints];
+        for (text, quantities, zones, expected) in [
+            ("attention_mm = 5", &every[..1], all, "5 mm"),
+            ("alarm_mm = 5", &every[..1], all, "5 mm"),
             (
                 &zones,
                 &every[..1],
+                all,
                 "3 mm (crest, pier) or 5 mm (rest of the wall)",
             ),
-            (&zones, &[(Length, &all[1..2])], "3 mm (pier)"),
-            (&zones, &[(Length, &all[..1])], "5 mm (foot)"),
+            (&zones, &[Length], &all[1..2], "3 mm (pier)"),
+            (&zones, &[Length], &all[..1], "5 mm (foot)"),
             (
                 three,
                 &every,
+                all,
                 "5 mm (motion), 2.5 mm (against neighbours) or 2 mm (joint opening)",
             ),
-            (three, &every[1..2], "2.5 mm"),
-            ("attention_mm = 5\njoints = { attention_mm = 5 }", &every, "5 mm"),
+            (three, &every[1..2], all, "2.5 mm"),
+            (
+                "attention_mm = 5\njoints = { attention_mm = 5 }",
+                &every,
+                all,
+                "5 mm",
+            ),
             (
                 &zones.replacen('\n', "\njoints = { attention_mm = 2 }\n", 1),
                 &every,
+                all,
                 "3 mm (motion, crest, pier), 5 mm (motion, rest of the wall) or 2 mm (joint opening)",
             ),
+            (
+                "out_attention_mm = [-5, 10]\nout_alarm_mm = [-8, 20]",
+                &[Out],
+                all,
+                "-5 mm (out of the wall) or 10 mm (out of the wall)",
+            ),
+            ("rate_attention_mm_per_year = 1.5", &[Rate], all, "1.5 mm a year"),
         ] {
-            assert_eq!(said(text, compared, Language::English), expected, "{text}");
+            assert_eq!(
+                said(text, quantities, zones, Language::English),
+                expected,
+                "{text}"
+            );
         }
         assert_eq!(
-            said(three, &every[1..], Language::German),
+            said(three, &every[1..], all, Language::German),
             "2,5 mm (gegen Nachbarn) oder 2 mm (Fugen\u{f6}ffnung)"
         );
     }

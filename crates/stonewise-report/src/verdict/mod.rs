@@ -15,13 +15,17 @@ mod lost;
 mod sentence;
 mod series;
 #[cfg(test)]
+mod set_thresholds;
+#[cfg(test)]
 pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
+mod time;
 
-pub use evidence::verdict_on;
+pub use evidence::{Pair, verdict_on};
 pub(crate) use series::name as term_name;
 pub use series::{inseparable_in_words, series_verdict};
+pub use time::Course;
 
 use stonewise_base::warnings::Warning;
 

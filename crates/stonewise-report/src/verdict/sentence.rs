@@ -1,12 +1,12 @@
 //! The verdict in words.
 
-use super::area::state_of;
+use super::area::{gives, state_of};
 use super::case::Case;
-use super::judged::{Judged, JudgedStone, Level, deformed};
-use super::limits::{Compared, Quantity, in_words};
+use super::judged::{Finding, Judged};
+use super::limits::{Placed, in_words, of_attention};
 use crate::texts::{Texts, counted, fill};
 use stonewise_base::report_params::Language;
-use stonewise_base::thresholds::{Levels, Thresholds};
+use stonewise_base::thresholds::{Level, Quantity, Thresholds};
 use stonewise_core::registration::ZONE_EXTENTS_M;
 use stonewise_figure::count;
 use stonewise_results::records::{Area, Largest, Reason, ReasonCode, State};
@@ -20,14 +20,12 @@ struct Speaker<'a> {
     texts: &'static Texts,
 }
 
-/// The sentence on the wall: its state, why, and the most important numbers. `apparent`: stones beyond the
-/// alarm threshold if the run were sound.
+/// The sentence on the wall: its state, why, and the most important numbers.
 pub(super) fn sentence(
     case: &Case,
     thresholds: &Thresholds,
     judged: &Judged,
     wall: &Area,
-    apparent: usize,
     language: Language,
 ) -> String {
     let speaker = Speaker {
@@ -38,7 +36,7 @@ pub(super) fn sentence(
         texts: Texts::of(language),
     };
     let mut clauses: Vec<String> = speaker.deciding().iter().map(|r| speaker.clause(*r)).collect();
-    clauses.extend(speaker.numbers(apparent));
+    clauses.extend(speaker.numbers());
     clauses.extend(speaker.shape());
     clauses.extend(speaker.not_measured());
     format!("{}: {}.", speaker.texts.state(wall.state), clauses.join("; "))
@@ -120,17 +118,11 @@ impl Speaker<'_> {
         match reason {
             R::NotConverged => c.not_converged.to_owned(),
             R::InDoubt => c.in_doubt.to_owned(),
-            R::LengthAlarm => self.beyond(c.moved_alarm, Quantity::Length, Level::Alarm),
-            R::LengthAttention => self.beyond(c.moved_attention, Quantity::Length, Level::Attention),
-            R::NeighboursAlarm => self.beyond(c.neighbours_alarm, Quantity::Neighbours, Level::Alarm),
-            R::NeighboursAttention => {
-                self.beyond(c.neighbours_attention, Quantity::Neighbours, Level::Attention)
-            }
-            R::JointsAlarm => self.beyond(c.joints_alarm, Quantity::Joints, Level::Alarm),
-            R::JointsAttention => self.beyond(c.joints_attention, Quantity::Joints, Level::Attention),
-            R::DeformationAlarm => self.deformed(c.deformed_alarm, Level::Alarm),
-            R::DeformationAttention => self.deformed(c.deformed_attention, Level::Attention),
-            R::DeformationReachesThreshold => self.deformed(c.deformed_reaches, Level::Reaches),
+            R::Alarm(quantity) => self.beyond(quantity, Level::Alarm, reason),
+            R::Attention(quantity) => self.beyond(quantity, Level::Attention, reason),
+            R::NotJudged(Quantity::Departure) => c.departure_not_judged.to_owned(),
+            R::NotJudged(_) => c.rate_not_judged.to_owned(),
+            R::DeformationReachesThreshold => self.counted(c.deformed_reaches, reason),
             R::DeformationShown => counted(c.deformed, self.judged.deformed_zones().len(), &[]),
             R::StonesLost => counted(c.lost, wall.lost, &[]),
             R::MotionShown if wall.moved > 0 => {
@@ -151,50 +143,28 @@ impl Speaker<'_> {
         }
     }
 
-    fn stones(&self, keep: impl Fn(&JudgedStone) -> bool) -> Vec<Option<usize>> {
-        let kept = self.judged.stones.iter().filter(|s| keep(s));
-        kept.map(|s| s.zone).collect()
+    /// What a reason names.
+    fn named(&self, reason: ReasonCode) -> Vec<&Finding> {
+        let all = self.judged.findings.iter();
+        all.filter(|f| gives(f, reason)).collect()
     }
 
-    /// Zones of the stones or joints of which a quantity lies at this level.
-    fn at(&self, quantity: Quantity, level: Level) -> Compared {
-        let zones = match quantity {
-            Quantity::Length => self.stones(|s| s.length == level),
-            Quantity::Neighbours => self.stones(|s| s.neighbours == level),
-            Quantity::Joints => {
-                let joints = self.judged.joints.iter().filter(|j| j.opening == level);
-                joints.map(|j| j.zone).collect()
-            }
-        };
-        Compared { quantity, zones }
+    fn beyond(&self, quantity: Quantity, level: Level, reason: ReasonCode) -> String {
+        let c = &self.texts.clauses;
+        let text = self.counted(c.beyond(quantity), reason);
+        fill(&text, &[("level", c.levels[level as usize])])
     }
 
-    fn beyond(&self, text: [&'static str; 2], quantity: Quantity, level: Level) -> String {
-        let threshold = match level {
-            Level::Alarm => Levels::alarm_m,
-            _ => Levels::attention_m,
-        };
-        let compared = self.at(quantity, level);
-        let n = compared.zones.len();
-        let t = in_words(self.thresholds, &[compared], threshold, self.texts);
-        counted(text, n, &[("t", &t)])
+    /// A text with the number of what a reason names, and with its thresholds.
+    fn counted(&self, text: [&'static str; 2], reason: ReasonCode) -> String {
+        let named = self.named(reason);
+        counted(text, named.len(), &[("t", &self.limits(&named))])
     }
 
-    /// Zones of which the deformation lies at this level.
-    fn deformed(&self, text: [&'static str; 2], level: Level) -> String {
-        let zones = self.judged.deformed_zones().iter();
-        let n = zones.filter(|z| deformed(z, self.thresholds) == level).count();
-        let t = self.deformation_threshold(level);
-        counted(text, n, &[("t", &t)])
-    }
-
-    fn deformation_threshold(&self, level: Level) -> String {
-        let levels = self.thresholds.of_deformation();
-        let threshold_m = match level {
-            Level::Alarm => levels.alarm_m(),
-            _ => levels.attention_m(),
-        };
-        threshold_m.map_or_else(String::new, |m| format!("{} mm", self.texts.threshold(1e3 * m)))
+    /// The thresholds that decided.
+    fn limits(&self, named: &[&Finding]) -> String {
+        let compared: Vec<Placed> = named.iter().map(|f| (f.threshold, f.zone)).collect();
+        in_words(self.thresholds, &compared, self.texts)
     }
 
     /// What is known of the shape of the wall; nothing of a run in doubt.
@@ -245,38 +215,38 @@ impl Speaker<'_> {
 
     fn reaching(&self) -> String {
         let c = &self.texts.clauses;
-        let compared = Quantity::ALL.map(|quantity| self.at(quantity, Level::Reaches));
-        let reaches = |level: Level| level == Level::Reaches;
-        let stones = self.stones(|s| reaches(s.length) || reaches(s.neighbours)).len();
-        let joints = compared[2].zones.len();
+        let reason = ReasonCode::IntervalReachesThreshold;
+        let stones = self.judged.stones.iter().filter(|s| s.reaches).count();
+        let named = self.named(reason);
+        let joints = named.iter().filter(|f| f.quantity == Quantity::Joints).count();
         let text = match (stones, joints) {
             (_, 0) => c.reaches,
             (0, _) => c.joints_reach,
             _ => c.stones_or_joints_reach,
         };
-        let t = in_words(self.thresholds, &compared, Levels::attention_m, self.texts);
-        counted(text, stones + joints, &[("t", &t)])
+        counted(text, stones + joints, &[("t", &self.limits(&named))])
     }
 
     fn below(&self) -> String {
         let c = &self.texts.clauses;
-        let everywhere = self.stones(|_| true);
-        let compared = Quantity::ALL.map(|quantity| Compared {
-            quantity,
-            zones: everywhere.clone(),
-        });
-        let asked = self.judged.joints.iter().any(|j| j.opening > Level::NotAsked);
-        let text = if asked { c.below_with_joints } else { c.below };
-        // Where only deformations have thresholds.
-        let t = match in_words(self.thresholds, &compared, Levels::attention_m, self.texts) {
-            t if t.is_empty() => self.deformation_threshold(Level::Attention),
-            t => t,
+        let zones = self.judged.stones.iter().map(|s| s.zone).collect();
+        let is_asked = |f: &Finding| f.quantity == Quantity::Joints;
+        let text = match self.judged.findings.iter().any(is_asked) {
+            true => c.below_with_joints,
+            false => c.below,
         };
+        let mut compared = of_attention(self.thresholds, &zones);
+        if compared.is_empty() {
+            // Only deformations have thresholds.
+            let deformation = self.thresholds.of(Quantity::Deformation, None);
+            compared.extend(deformation.take(1).map(|t| (t, None)));
+        }
+        let t = in_words(self.thresholds, &compared, self.texts);
         counted(text, self.wall.measured, &[("t", &t)])
     }
 
     /// Clauses with numbers that belong to the state.
-    fn numbers(&self, apparent: usize) -> Vec<String> {
+    fn numbers(&self) -> Vec<String> {
         let c = &self.texts.clauses;
         let mut out = Vec::new();
         match self.wall.state {
@@ -287,6 +257,8 @@ impl Speaker<'_> {
                 }
             }
             State::CannotTell if self.case.not_converged || self.case.in_doubt => {
+                // As if the run were sound: what the numbers alone would say.
+                let apparent = self.judged.stones.iter().filter(|s| s.apparent_alarm).count();
                 if apparent > 0 {
                     out.push(counted(c.apparent, apparent, &[]));
                 }

@@ -6,7 +6,7 @@ use super::interval::Estimate;
 use super::testing::Normal;
 use nalgebra::{Matrix3, Point2, Vector3};
 use stonewise_base::report_params::Language;
-use stonewise_base::thresholds::Thresholds;
+use stonewise_base::thresholds::{Quantity, Thresholds};
 use stonewise_core::registration::ZoneKind;
 use stonewise_core::statistics::q_values;
 use stonewise_results::detection_limit_m;
@@ -16,7 +16,7 @@ use stonewise_results::records::{
 
 const SD_M: f64 = 0.0005;
 
-fn thresholds(text: &str) -> Thresholds {
+pub(super) fn thresholds(text: &str) -> Thresholds {
     toml::from_str(text).unwrap()
 }
 
@@ -26,7 +26,7 @@ fn usual() -> Thresholds {
 }
 
 /// A stone at (along, up) that truly moved so, measured with an error of `SD_M` per axis.
-fn stone(stone_id: u32, place: [f64; 2], moved: Vector3<f64>, normal: &mut Normal) -> StoneCase {
+pub(super) fn stone(stone_id: u32, place: [f64; 2], moved: Vector3<f64>, normal: &mut Normal) -> StoneCase {
     let covariance = Matrix3::identity() * SD_M * SD_M;
     let vector = moved + normal.vector() * SD_M;
     let detection_limit_m = detection_limit_m(&vector, &covariance);
@@ -35,6 +35,8 @@ fn stone(stone_id: u32, place: [f64; 2], moved: Vector3<f64>, normal: &mut Norma
         place: Point2::from(place),
         lost: false,
         is_masonry: true,
+        rate: None,
+        departure: None,
         measured: Some(StoneMeasured {
             motion: Estimate { vector, covariance },
             neighbours: Estimate { vector, covariance },
@@ -47,7 +49,7 @@ fn stone(stone_id: u32, place: [f64; 2], moved: Vector3<f64>, normal: &mut Norma
 }
 
 /// A wall of 100 stones of which the first `moving` truly moved by `length_m`; the datum is known.
-fn wall(moving: u32, length_m: f64, seed: u64) -> Case {
+pub(super) fn wall(moving: u32, length_m: f64, seed: u64) -> Case {
     let mut normal = Normal::new(seed);
     let stones = (0..100).map(|i| {
         let moved = Vector3::z() * if i < moving { length_m } else { 0.0 };
@@ -61,11 +63,11 @@ fn wall(moving: u32, length_m: f64, seed: u64) -> Case {
     }
 }
 
-fn judge(case: &Case, thresholds: &Thresholds) -> EpochVerdict {
+pub(super) fn judge(case: &Case, thresholds: &Thresholds) -> EpochVerdict {
     assess(case, thresholds, Language::English)
 }
 
-fn codes(verdict: &EpochVerdict) -> Vec<ReasonCode> {
+pub(super) fn codes(verdict: &EpochVerdict) -> Vec<ReasonCode> {
     verdict.reasons.iter().map(|r| r.code).collect()
 }
 
@@ -197,7 +199,7 @@ fn without_a_datum_nothing_is_fine_but_a_motion_against_the_rest_is_an_alarm() {
         let whole = "; the registration error between the surveys is unknown, so a motion of the wall as a whole would not show.";
         assert_eq!(
             verdict.sentence.ends_with(whole),
-            !thresholds.wall.length.is_empty(),
+            thresholds.of(Quantity::Length, None).next().is_some(),
             "{}",
             verdict.sentence
         );
@@ -396,10 +398,11 @@ fn at_most_five_percent_of_the_stones_said_to_move_stand_still() {
 }
 
 /// A still wall with a zone that bulged by 1.9 mm (1.7 to 2.1), or none.
-fn bulged(is_bulged: bool) -> Case {
+pub(super) fn bulged(is_bulged: bool) -> Case {
     let zone = DeformedZone {
         zone_id: 1,
         state: State::default(),
+        decided_by: None,
         kind: ZoneKind::Bulge,
         along_m: 4.0,
         up_m: 2.0,
@@ -452,12 +455,12 @@ fn deformations_have_thresholds_of_their_own_or_those_of_lengths() {
         (
             "deformation_attention_mm = 1.0",
             State::Attention,
-            ReasonCode::DeformationAttention,
+            ReasonCode::Attention(Quantity::Deformation),
         ),
         (
             "deformation_alarm_mm = 1.5",
             State::Alarm,
-            ReasonCode::DeformationAlarm,
+            ReasonCode::Alarm(Quantity::Deformation),
         ),
         (
             "deformation_attention_mm = 2.0",

@@ -1,6 +1,7 @@
 //! Colours of stones by their motion out of the wall.
 
 use crate::{StoneRow, component_limit_m};
+use stonewise_base::thresholds::Thresholds;
 use stonewise_figure::Scale;
 
 /// Colour of what was not measured.
@@ -10,10 +11,10 @@ const UNKNOWN: [u8; 3] = [150; 3];
 pub struct FaceColours(Scale);
 
 impl FaceColours {
-    /// The scale of these rows.
-    pub fn new(rows: &[StoneRow]) -> Self {
+    /// The scale of these rows, with the thresholds of their project.
+    pub fn new(rows: &[StoneRow], thresholds: &Thresholds) -> Self {
         let motions = rows.iter().filter_map(|r| r.motion.as_ref());
-        Self(Scale::Diverging(component_limit_m(motions)))
+        Self(Scale::Diverging(component_limit_m(motions, thresholds)))
     }
 
     /// Colour of a stone; grey where its motion is not known.

@@ -12,7 +12,7 @@ const COLUMNS: [&str; 6] = ["stone_id", "d_along", "d_up", "d_out", "length_m", 
 /// Faces of all stones as triangles, coloured by the out-of-plane displacement; grey where it was not
 /// measured.
 pub(super) fn face_mesh(results: &ResultSet) -> ColouredMesh {
-    let colours = FaceColours::new(&results.stones);
+    let colours = FaceColours::new(&results.stones, &results.thresholds());
     let columns: Vec<&StoneColumn> = COLUMNS.iter().filter_map(|name| column(name)).collect();
     let mut mesh = ColouredMesh {
         scalars: columns.iter().map(|c| (c.name.to_owned(), Vec::new())).collect(),

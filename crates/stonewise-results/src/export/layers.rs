@@ -18,7 +18,7 @@ use stonewise_io::table::{Column, Table, TableError};
 pub(super) fn layers(results: &ResultSet) -> Result<Vec<Layer>, TableError> {
     let rows: Vec<StoneRow> = results.stones.clone();
     let measured = results.measured();
-    let styles = styles(&measured);
+    let styles = styles(results, &measured);
     let crs = crs(results);
 
     let world = |s: &StoneRow| {
@@ -134,8 +134,9 @@ pub(super) fn layers(results: &ResultSet) -> Result<Vec<Layer>, TableError> {
     Ok(layers)
 }
 
-fn styles(measured: &[(&StoneRow, &RowMotion)]) -> Vec<LayerStyle> {
-    let shared = Scale::Diverging(component_limit_m(measured.iter().map(|(_, m)| *m)));
+fn styles(results: &ResultSet, measured: &[(&StoneRow, &RowMotion)]) -> Vec<LayerStyle> {
+    let motions = measured.iter().map(|(_, m)| *m);
+    let shared = Scale::Diverging(component_limit_m(motions, &results.thresholds()));
     let limit = Scale::Sequential(nice_scale_m(measured.iter().map(|(_, m)| m.detection_limit_m)));
     vec![
         stone_style("Out of the wall", "d_out", shared, true),

@@ -26,9 +26,9 @@ pub use trends::{
     TrendsRecord, ZoneTrend,
 };
 pub use verdict::{
-    AnswerVerdict, Area, DeformationVerdict, DeformedZone, DetectionLimit, EpochVerdict, Headline, Headlines,
-    JointVerdict, Largest, Reason, ReasonCode, SeriesVerdict, State, StoneVerdict, VERDICT_VERSION, Verdict,
-    ZoneVerdict,
+    AnswerVerdict, Area, Decision, DeformationVerdict, DeformedZone, DetectionLimit, EpochVerdict, Headline,
+    Headlines, JointVerdict, Largest, Reason, ReasonCode, SeriesVerdict, State, StoneVerdict,
+    VERDICT_VERSION, Verdict, ZoneVerdict,
 };
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::DatumState;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
-use stonewise_base::thresholds::Thresholds;
+use stonewise_base::thresholds::{Quantity, Threshold, Thresholds};
 use stonewise_core::registration::ZoneKind;
 use stonewise_core::series::Answer;
 
@@ -170,28 +170,16 @@ pub struct Reason {
 
 /// Reasons, for programs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[serde(into = "String", try_from = "String")]
 pub enum ReasonCode {
     /// The adjustment did not converge.
     NotConverged,
     /// The results as a whole are in doubt for another reason.
     InDoubt,
-    /// A stone moved beyond its alarm threshold.
-    LengthAlarm,
-    /// A stone moved against its neighbours beyond the alarm threshold.
-    NeighboursAlarm,
-    /// A joint opened beyond the alarm threshold.
-    JointsAlarm,
-    /// A zone deformed beyond the alarm threshold.
-    DeformationAlarm,
-    /// A stone moved beyond the threshold of attention.
-    LengthAttention,
-    /// A stone moved against its neighbours beyond the threshold of attention.
-    NeighboursAttention,
-    /// A joint opened beyond the threshold of attention.
-    JointsAttention,
-    /// A zone deformed beyond the threshold of attention.
-    DeformationAttention,
+    /// Something lies beyond an alarm threshold of this quantity.
+    Alarm(Quantity),
+    /// Something lies beyond a threshold of attention of this quantity.
+    Attention(Quantity),
     /// Stones that the first epoch shows well are missing in the later one.
     StonesLost,
     /// Motion is shown, and there are no thresholds.
@@ -204,6 +192,8 @@ pub enum ReasonCode {
     FewMeasured,
     /// The registration error of the epochs is unknown, and a motion of the wall as a whole would matter.
     DatumUnknown,
+    /// A quantity has thresholds, and what is to be compared with them is known of fewer than half of the stones.
+    NotJudged(Quantity),
     /// An interval reaches the threshold of attention without lying beyond it.
     IntervalReachesThreshold,
     /// The interval of a deformation reaches the threshold of attention without lying beyond it.
@@ -214,6 +204,75 @@ pub enum ReasonCode {
     NoMotionShown,
 }
 
+impl ReasonCode {
+    /// Every code that there is.
+    pub fn all() -> Vec<Self> {
+        let plain = [
+            Self::NotConverged,
+            Self::InDoubt,
+            Self::StonesLost,
+            Self::MotionShown,
+            Self::DeformationShown,
+            Self::NothingMeasured,
+            Self::FewMeasured,
+            Self::DatumUnknown,
+            Self::IntervalReachesThreshold,
+            Self::DeformationReachesThreshold,
+            Self::BelowThresholds,
+            Self::NoMotionShown,
+            Self::NotJudged(Quantity::Rate),
+            Self::NotJudged(Quantity::Departure),
+        ];
+        let beyond = Quantity::ALL
+            .into_iter()
+            .flat_map(|q| [Self::Alarm(q), Self::Attention(q)]);
+        plain.into_iter().chain(beyond).collect()
+    }
+}
+
+impl From<ReasonCode> for String {
+    fn from(code: ReasonCode) -> Self {
+        use ReasonCode as R;
+        let plain = match code {
+            R::Alarm(quantity) => return format!("{}_alarm", quantity.word()),
+            R::Attention(quantity) => return format!("{}_attention", quantity.word()),
+            R::NotJudged(quantity) => return format!("{}_not_judged", quantity.word()),
+            R::NotConverged => "not_converged",
+            R::InDoubt => "in_doubt",
+            R::StonesLost => "stones_lost",
+            R::MotionShown => "motion_shown",
+            R::DeformationShown => "deformation_shown",
+            R::NothingMeasured => "nothing_measured",
+            R::FewMeasured => "few_measured",
+            R::DatumUnknown => "datum_unknown",
+            R::IntervalReachesThreshold => "interval_reaches_threshold",
+            R::DeformationReachesThreshold => "deformation_reaches_threshold",
+            R::BelowThresholds => "below_thresholds",
+            R::NoMotionShown => "no_motion_shown",
+        };
+        plain.to_owned()
+    }
+}
+
+impl TryFrom<String> for ReasonCode {
+    type Error = String;
+
+    fn try_from(word: String) -> Result<Self, String> {
+        let found = Self::all().into_iter().find(|code| String::from(*code) == word);
+        found.ok_or_else(|| format!("{word:?} is no reason of a verdict"))
+    }
+}
+
+/// The threshold that decided a state, and what was compared with it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Decision {
+    /// The threshold.
+    #[serde(flatten)]
+    pub threshold: Threshold,
+    /// The 95 % interval of what it limits, in the unit of the limit; null where that is not known.
+    pub interval: Option<[f64; 2]>,
+}
+
 /// Numbers of the wall or of a zone. Lengths are millimetres.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Area {
@@ -221,6 +280,9 @@ pub struct Area {
     pub state: State,
     /// Why, the most important first.
     pub reasons: Vec<ReasonCode>,
+    /// The threshold that decided the state; null where something else did, and where no threshold is reached.
+    #[serde(default)]
+    pub decided_by: Option<Decision>,
     /// Stones of the first epoch in it.
     pub stones: usize,
     /// Stones that were measured.
@@ -287,6 +349,9 @@ pub struct StoneVerdict {
     pub zone: Option<String>,
     /// Its state.
     pub state: State,
+    /// The threshold that decided the state; null where something else did, and where no threshold is reached.
+    #[serde(default)]
+    pub decided_by: Option<Decision>,
     /// Whether it moved, with the false discovery rate over all stones of the wall controlled at 5 %.
     pub moved: bool,
     /// Whether its motion is above its own 95 % limit (`significant` in the stone table).
@@ -336,6 +401,9 @@ pub struct DeformedZone {
     pub zone_id: u32,
     /// State by its interval.
     pub state: State,
+    /// The threshold that decided the state; null where something else did, and where no threshold is reached.
+    #[serde(default)]
+    pub decided_by: Option<Decision>,
     /// What it resembles.
     pub kind: ZoneKind,
     /// Middle along the unrolled wall, metres.
@@ -359,6 +427,9 @@ pub struct JointVerdict {
     pub stones: [u32; 2],
     /// Its state.
     pub state: State,
+    /// The threshold that decided the state; null where something else did, and where no threshold is reached.
+    #[serde(default)]
+    pub decided_by: Option<Decision>,
     /// Opening, millimetres; negative: it closes.
     pub opening_mm: f64,
     /// Its 95 % interval.
@@ -413,6 +484,7 @@ mod tests {
     use super::*;
     use serde_json::Value;
     use std::collections::BTreeSet;
+    use stonewise_base::thresholds::Level;
 
     fn keys(object: &Value) -> BTreeSet<String> {
         object.as_object().unwrap().keys().cloned().collect()
@@ -431,6 +503,7 @@ mod tests {
         let joint = JointVerdict {
             stones: [1, 2],
             state: State::Fine,
+            decided_by: None,
             opening_mm: 1.0,
             interval_mm: [0.5, 1.5],
             q: 0.01,
@@ -441,7 +514,15 @@ mod tests {
             interval_mm: [1.0, 3.0],
         };
         let area = Area {
-            reasons: vec![ReasonCode::LengthAlarm],
+            reasons: vec![ReasonCode::Alarm(Quantity::Length)],
+            decided_by: Some(Decision {
+                threshold: Threshold {
+                    quantity: Quantity::Length,
+                    level: Level::Alarm,
+                    limit: 10.0,
+                },
+                interval: Some([27.9, 28.9]),
+            }),
             largest: Some(largest),
             largest_opening: Some(joint),
             detection_limit: Some(DetectionLimit {
@@ -452,7 +533,7 @@ mod tests {
         };
         let epoch = EpochVerdict {
             reasons: vec![Reason {
-                code: ReasonCode::LengthAlarm,
+                code: ReasonCode::Alarm(Quantity::Length),
                 text: "moved".to_owned(),
             }],
             wall: area.clone(),
@@ -466,6 +547,7 @@ mod tests {
                 zones: vec![DeformedZone {
                     zone_id: 1,
                     state: State::Alarm,
+                    decided_by: None,
                     kind: ZoneKind::Bulge,
                     along_m: 1.0,
                     up_m: 2.0,
@@ -496,6 +578,7 @@ mod tests {
             (of("stone"), &epoch["stones"][0]),
             (of("joint"), &epoch["joints"][0]),
             (of("largest"), &epoch["wall"]["largest"]),
+            (of("decision"), &epoch["wall"]["decided_by"]),
             (of("deformation"), &epoch["deformation"]),
             (of("deformed_zone"), &epoch["deformation"]["zones"][0]),
         ];
@@ -510,12 +593,12 @@ mod tests {
         }
         let states = State::WORST_FIRST.map(|s| serde_json::to_value(s).unwrap());
         assert_eq!(words(&of("state")["enum"]), words(&Value::from(states.to_vec())));
-        for word in words(&of("code")["enum"]) {
-            assert!(serde_json::from_value::<ReasonCode>(Value::from(word)).is_ok());
-        }
+        let codes = ReasonCode::all().into_iter().map(String::from);
+        assert_eq!(words(&of("code")["enum"]), codes.collect());
+        let quantities = Quantity::ALL.map(|q| serde_json::to_value(q).unwrap());
         assert_eq!(
-            words(&of("code")["enum"]).len(),
-            ReasonCode::NoMotionShown as usize + 1
+            words(&of("decision")["properties"]["quantity"]["enum"]),
+            words(&Value::from(quantities.to_vec()))
         );
     }
 

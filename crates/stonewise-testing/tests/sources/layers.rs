@@ -92,9 +92,9 @@ const RESULTS: Layers = &[
         "stone_row",
     ],
     &["columns", "evidence", "outlines", "scale", "zone_place"],
-    &["neighbours", "stone_table", "velocities"],
+    &["courses", "neighbours", "stone_table"],
     &["result_set"],
-    &["comparison", "joints"],
+    &["comparison", "fixed_datum", "joints"],
     &["export"],
 ];
 
@@ -152,7 +152,7 @@ const PY: Layers = &[
     &["clouds", "error"],
     &["arrays", "attended"],
     &["command", "view"],
-    &["adjust", "detector", "m3c2", "transfer", "units"],
+    &["adjust", "detector", "fixed", "m3c2", "transfer", "units"],
 ];
 
 #[test]

@@ -124,7 +124,11 @@ fn stone_ids(table: &Table) -> Result<Vec<u32>> {
 
 /// `verdict.json` and the verdict in `run.json` are what the tables give.
 fn verdict(results: &Path, run: &RunRecord, progress: &dyn Progress) -> Compared {
-    let epochs: Vec<&str> = run.epochs.iter().map(|e| e.name.as_str()).collect();
+    let epochs: Vec<(&str, Option<&str>)> = run
+        .epochs
+        .iter()
+        .map(|e| (e.name.as_str(), e.date.as_deref()))
+        .collect();
     let verdict = verdict_of_tables(results, &epochs, &run.warnings, &run.parameters, progress)?;
     let found: Value = read_json(&results.join(VERDICT))?;
     let headlines = [json(&run.verdict), json(&Some(verdict.headlines()))];

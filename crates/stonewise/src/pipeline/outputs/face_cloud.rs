@@ -48,7 +48,7 @@ const ROUNDING_M: f64 = 1e-3;
 /// Writes `stones.laz`: every point of a stone of the first epoch, coloured by its motion out of the wall on the
 /// scale of the report, grey where that was not measured.
 fn write_face_cloud(context: &Context, first: &Labelled, rows: &[StoneRow]) -> Result<()> {
-    let colours = FaceColours::new(rows);
+    let colours = FaceColours::new(rows, &context.project.settings.thresholds);
     let by_id: BTreeMap<u32, &StoneRow> = rows.iter().map(|r| (r.stone_id, r)).collect();
     let tiles = &first.ingested.tiles;
     let boxes = (0..tiles.tile_count()).map(|t| tiles.bounds(t));

@@ -250,6 +250,7 @@ fn table(
     names: &[&str],
 ) -> std::result::Result<Table, TableError> {
     let by_stone: BTreeMap<StoneId, &StoneTrend> = found.stones.iter().map(|s| (s.stone, s)).collect();
+    let departures: BTreeMap<StoneId, Trend> = found.departures.iter().copied().collect();
     let rows: Vec<Option<&StoneTrend>> = stones.iter().map(|id| by_stone.get(id).copied()).collect();
     let reals = |of: &dyn Fn(&StoneTrend) -> Option<f64>| -> Vec<Option<f64>> {
         rows.iter().map(|row| row.and_then(of)).collect()
@@ -307,6 +308,10 @@ fn table(
             p: 0.0,
         })
     };
+    let departure = "newest epoch less what the others predict for it under its conditions";
+    add("departure", "m", departure, &|s| {
+        departures.get(&s.stone).copied()
+    })?;
     add(
         "step",
         "m",

@@ -8,11 +8,11 @@ use crate::pipeline::outputs::tables::TABLES;
 use crate::pipeline::outputs::trends::TRENDS;
 use crate::pipeline::steps::change::CHANGE;
 use crate::pipeline::until::Until;
-use crate::results::ResultSet;
 use crate::results::names::{TRENDS as TRENDS_FILE, VERDICT as FILE};
 use crate::results::records::{EpochVerdict, TrendsRecord, Verdict};
+use crate::results::{ResultSet, read_courses};
 use crate::settings::Settings;
-use crate::verdict::{is_doubted, series_verdict, verdict_on};
+use crate::verdict::{Course, Pair, is_doubted, series_verdict, verdict_on};
 use crate::warnings::Warning;
 use std::path::Path;
 use std::sync::Arc;
@@ -40,11 +40,15 @@ impl Run<'_> {
 
 fn write_verdict(context: &Context) -> Result<Verdict> {
     let project = context.project;
-    let names: Vec<&str> = project.epochs.iter().map(|e| e.name.as_str()).collect();
+    let epochs: Vec<(&str, Option<&str>)> = project
+        .epochs
+        .iter()
+        .map(|e| (e.name.as_str(), e.date.as_deref()))
+        .collect();
     let warnings = context.warnings.sorted();
     let verdict = verdict_of_tables(
         &context.out,
-        &names,
+        &epochs,
         &warnings,
         &project.settings,
         context.progress,
@@ -53,32 +57,40 @@ fn write_verdict(context: &Context) -> Result<Verdict> {
     Ok(verdict)
 }
 
-/// The verdict that the tables in a folder give. `epochs`: the names of all, the reference first; `warnings`:
-/// those of the run.
+/// The verdict that the tables in a folder give. `epochs`: names and dates of all, the reference first;
+/// `warnings`: those of the run.
 pub(crate) fn verdict_of_tables(
     folder: &Path,
-    epochs: &[&str],
+    epochs: &[(&str, Option<&str>)],
     warnings: &[Warning],
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Verdict> {
     let (thresholds, language) = (&settings.thresholds, settings.report.language);
-    let (reference, later) = match epochs {
-        [] => ("", &[] as &[&str]),
-        [first, later @ ..] => (*first, later),
-    };
-    let on_epoch = |(pair, epoch): (usize, &&str)| -> Result<EpochVerdict> {
-        progress.check()?;
-        let results = ResultSet::read_measured(folder, pair)?;
-        let in_doubt = is_doubted(warnings, epoch, later.iter().copied());
-        let names = [reference, *epoch].map(str::to_owned);
-        Ok(verdict_on(&results, names, in_doubt, thresholds, language))
-    };
-    let epochs = (1..).zip(later).map(on_epoch).collect::<Result<Vec<_>>>()?;
-    let trends: Option<TrendsRecord> = match later.len() > 1 {
+    let trends: Option<TrendsRecord> = match epochs.len() > 2 {
         true => Some(read_json(&folder.join(TRENDS_FILE))?),
         false => None,
     };
-    let series = trends.map(|found| series_verdict(&found, language));
+    let course = Course {
+        epochs,
+        trends: trends.as_ref(),
+        stones: &read_courses(folder)?,
+    };
+    let reference = epochs.first().map_or("", |(name, _)| *name);
+    let on_epoch = |(number, epoch): (usize, &str)| -> Result<EpochVerdict> {
+        progress.check()?;
+        let results = ResultSet::read_measured(folder, number)?;
+        let pair = Pair {
+            epochs: [reference, epoch],
+            in_doubt: is_doubted(warnings, epoch, course.later()),
+            course: &course,
+        };
+        Ok(verdict_on(&results, &pair, thresholds, language))
+    };
+    let epochs = (1..)
+        .zip(course.later())
+        .map(on_epoch)
+        .collect::<Result<Vec<_>>>()?;
+    let series = trends.as_ref().map(|found| series_verdict(found, language));
     Ok(Verdict::new(thresholds, epochs).with_series(series))
 }
