@@ -5,7 +5,7 @@ use super::params::GicpParams;
 use super::uncertainty::uncertainty;
 use super::window::Window;
 use crate::geometry::Rigid3;
-use crate::stone::{MotionFailure, PairResult, StoneMotion};
+use crate::stone::{MotionFailure, PairResult, SharedParts, StoneMotion};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 

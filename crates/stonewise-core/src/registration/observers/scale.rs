@@ -7,7 +7,7 @@
 use super::response::Response;
 use super::sight::SeenStone;
 use crate::geometry::Strain;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Strain that temperature gives a wall in every direction: at most 12e-6 per kelvin for masonry (EN 1996-1-1:2005,

@@ -82,6 +82,7 @@ pub struct StoneEvidence {
 mod tests {
     use super::*;
     use crate::geometry::{FaceFrame, Rigid3};
+    use crate::stone::SharedParts;
     use nalgebra::Matrix6;
 
     #[test]
@@ -99,6 +100,7 @@ mod tests {
                     0.1 * (r + c) as f64
                 }
             }),
+            shared: SharedParts::default(),
             relative: Vector3::zeros(),
             relative_covariance: Matrix3::zeros(),
             own_motion_p: 1.0,
