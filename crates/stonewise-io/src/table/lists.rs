@@ -69,8 +69,10 @@ impl Lists {
     ) -> Result<(), ParquetError> {
         let rows = &self.rows[rows];
         // An empty list has one entry without a value.
-        let of_row =
-            |row: &Vec<_>| (0..row.len().max(1)).map(|k| (i16::from(!row.is_empty()), i16::from(k > 0)));
+        let of_row = |row: &Vec<_>| {
+            let is_filled = i16::from(!row.is_empty());
+            (0..row.len().max(1)).map(move |k| (is_filled, i16::from(k > 0)))
+        };
         let (defined, repeated): (Vec<i16>, Vec<i16>) = rows.iter().flat_map(of_row).unzip();
         let items = || rows.iter().flatten();
         let texts: Vec<ByteArray> = items().map(|(text, _)| text.as_str().into()).collect();
