@@ -10,7 +10,7 @@ use stonewise_results::records::{
     AdjustmentRecord, Datum, DatumState, EpochRecord, EstimatorRecord, InputRecord, ObserversRecord,
     ProjectRecord, RegistrationRecord, RunRecord,
 };
-use stonewise_results::{RowMotion, Status, StoneRow, write_outlines, write_stones};
+use stonewise_results::{Budget, RowMotion, Status, StoneRow, write_outlines, write_stones};
 
 /// A folder with the result files of these rows.
 pub fn folder(rows: &[StoneRow]) -> tempfile::TempDir {
@@ -195,5 +195,6 @@ fn motion(stone_id: u32) -> RowMotion {
             [Some(0.000_3); 3]
         },
         observability: 0.7,
+        budget: Budget::default(),
     }
 }

@@ -7,6 +7,7 @@
 //! that of any other C + H Q H', with Q the covariance of t.
 
 use super::ResultSet;
+use super::budget::Term;
 use super::columns::column;
 use super::stone_row::{Reference, RowMotion, StoneRow};
 use nalgebra::Matrix3;
@@ -97,7 +98,7 @@ fn with_fixed(results: &ResultSet, fixed: &BTreeSet<u32>) -> Result<Vec<StoneRow
         let reference = Reference {
             error: rigid.at(&row.centroid),
             turn: rigid.rotation(),
-            covariance: if is_fixed { -of_rigid } else { of_rigid },
+            terms: vec![(Term::CommonMotion, if is_fixed { -of_rigid } else { of_rigid })],
             ..Reference::default()
         };
         let motion = row.motion.as_ref().map(|motion| {
