@@ -19,8 +19,8 @@ use stonewise::results::records::{
     RegistrationRecord, RunRecord, StepTime, Timestamp,
 };
 use stonewise::results::{
-    Crop, Cut, PosedPhoto, RowMotion, SectionPoint, Status, StoneOutline, StoneRow, ThinPoint, Tracks,
-    crop_side_px, detection_limit_m, most_pictured, track_side_px, write_cameras, write_crops,
+    Budget, Crop, Cut, PosedPhoto, RowMotion, SectionPoint, Status, StoneOutline, StoneRow, Term, ThinPoint,
+    Tracks, crop_side_px, detection_limit_m, most_pictured, track_side_px, write_cameras, write_crops,
     write_outlines, write_sections, write_stones, write_thin_cloud, write_tracks,
 };
 use stonewise_base::messages::Said;
@@ -164,6 +164,7 @@ impl Wall {
             deformation_sd: [None; 3],
             p_loose: Some(if self.is_loose(i) { 0.99 } else { 0.01 }),
             observability: 0.6,
+            budget: Budget::from_sds([(Term::Stone, sigma * 0.6), (Term::Registration, sigma * 0.8)]),
         }
     }
 
