@@ -12,6 +12,7 @@ from collections import Counter
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pytest
 
 import stonewise
@@ -80,6 +81,15 @@ def test_matches_tell_of_every_stone(results):
     words = {"matched", "unseen", "lost", "ambiguous", "area_mismatch"}
     assert {m["outcome"] for m in matches} <= words
     assert all((m["outcome"] == "matched") == (m["matched_id"] is not None) for m in matches)
+
+
+def test_a_budget_adds_up_to_the_standard_deviation(results):
+    measured = results.stones_arrow.filter(pc.is_valid(results.stones_arrow["dx"])).to_pylist()
+    for stone in measured:
+        squares = sum(sd**2 for sd in results.budget(stone["stone_id"]).values())
+        assert np.sqrt(squares) == pytest.approx([stone["sd_along"], stone["sd_up"], stone["sd_out"]], rel=1e-9)
+    with pytest.raises(stonewise.Error, match="no stone 0"):
+        results.budget(0)
 
 
 def test_joints_lie_between_stones(results):

@@ -59,6 +59,8 @@ export interface ReportDocument {
   readonly sound: boolean;
   /** Whether uncertainties hold the error of the registration of the epochs. */
   readonly registrationKnown: boolean;
+  /** The terms of the standard deviations, in words. */
+  readonly terms: readonly string[];
   /** Known in-plane translation (along, up), millimetres. */
   readonly truth: readonly [number, number] | null;
   readonly blocks: Readonly<Record<string, readonly ColumnEntry[]>>;
@@ -85,6 +87,8 @@ export interface Stones {
   readonly relative: Three<Float64Array>;
   readonly rotation: Three<Float64Array>;
   readonly sigma: Three<Float64Array>;
+  /** What each term of the document adds to `sigma`, as a standard deviation: squares add up. */
+  readonly budget: readonly Three<Float64Array>[];
   /** Correlations along-up, along-out, up-out. */
   readonly correlation: Three<Float64Array>;
   readonly limit: Float64Array;
@@ -162,12 +166,12 @@ export async function readReport(page: Document): Promise<Report | null> {
   };
   const [stones, joints, change] = await Promise.all([block("stones"), block("joints"), block("change")]);
   if (!stones || !joints || !change) return null;
-  const all = readStones(stones);
+  const all = readStones(stones, document.terms.length);
   const indexOfId = new Map(Array.from({ length: all.count }, (_, i) => [all.id[i]!, i]));
   return { document, stones: all, joints: readJoints(joints), change: readChange(change), indexOfId, block };
 }
 
-function readStones(columns: Columns): Stones {
+function readStones(columns: Columns, terms: number): Stones {
   const numbers = (name: string) => columns.numbers(name);
   const three = (stem: string): Three<Float64Array> => [numbers(`${stem}Along`), numbers(`${stem}Up`), numbers(`${stem}Out`)];
   const id = columns.integers("id");
@@ -184,6 +188,7 @@ function readStones(columns: Columns): Stones {
     relative: three("rel"),
     rotation: three("rot"),
     sigma: three("sigma"),
+    budget: Array.from({ length: terms }, (_, n) => three(`term${n}`)),
     correlation: [numbers("corAlongUp"), numbers("corAlongOut"), numbers("corUpOut")],
     limit: numbers("limit"),
     observability: numbers("observability"),

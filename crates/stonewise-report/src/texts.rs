@@ -43,6 +43,8 @@ pub(crate) struct Texts {
     pub yearly: &'static YearlyTexts,
     /// What became of stones, in the order of [`Status::ALL`].
     pub statuses: [&'static str; 10],
+    /// Errors of a stone's budget, in the order of [`stonewise_results::Term::ALL`].
+    pub terms: [&'static str; 7],
 }
 
 /// Words for the states.
@@ -399,6 +401,15 @@ static ENGLISH: Texts = Texts {
         "the two epochs do not show the same surface, or nothing confirms a motion unlike the rest of the wall",
         "the surface is too flat to show the motion",
     ],
+    terms: [
+        "the stone itself and its neighbours",
+        "what points of stones share",
+        "poses of tracked photos",
+        "interior orientation of photos",
+        "scale of the epochs",
+        "registration of the epochs",
+        "the common motion",
+    ],
 };
 
 static GERMAN: Texts = Texts {
@@ -630,6 +641,15 @@ static GERMAN: Texts = Texts {
         "die Sch\u{e4}tzung ist nicht zur Ruhe gekommen",
         "die beiden Epochen zeigen nicht dieselbe Oberfl\u{e4}che, oder nichts best\u{e4}tigt eine Bewegung, die der \u{fc}brigen Mauer widerspricht",
         "die Oberfl\u{e4}che ist zu eben, um die Bewegung zu zeigen",
+    ],
+    terms: [
+        "den Stein selbst und seine Nachbarn",
+        "Gemeinsames der Punkte von Steinen",
+        "Posen verfolgter Fotos",
+        "innere Orientierung der Fotos",
+        "den Ma\u{df}stab der Epochen",
+        "die Registrierung der Epochen",
+        "die gemeinsame Bewegung",
     ],
 };
 

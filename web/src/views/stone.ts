@@ -66,7 +66,7 @@ export class StonePanel {
     const measured = isMeasured(stones, stone);
     parts.push(measured ? this.#numbers(stone) : this.#failure(stone), this.#cards.photos.of(stone),
       this.#cards.tracks.of(stone), this.#cards.sections.of(stone));
-    if (measured && this.#report.document.sound) parts.push(this.#ellipsoid(stone));
+    if (measured && this.#report.document.sound) parts.push(this.#budget(stone), this.#ellipsoid(stone));
     parts.push(this.#neighbours(stone), this.#quality(stone));
     this.element.replaceChildren(...parts.filter((part) => part !== null));
   }
@@ -133,6 +133,25 @@ export class StonePanel {
           cell(fixed(norm(stones.rotation, stone) * 1e3, 2)))));
     return registrationKnown || !sound ? table : el("div", {}, table,
       el("p", { class: "note" }, t("unknownDatum")));
+  }
+
+  /** Where the standard deviations come from, the largest share first. */
+  #budget(stone: number): Node | null {
+    const { stones, document: { terms, decimals } } = this.#report;
+    const sd = (metres: number) => el("td", { class: "n" }, fixed(metres * 1e3, decimals + 1));
+    const total = stones.sigma.reduce((sum, v) => sum + v[stone]! ** 2, 0);
+    const square = (n: number) => stones.budget[n]!.reduce((sum, v) => sum + v[stone]! ** 2, 0);
+    const shown = terms.map((_, n) => n).filter((n) => square(n) > 0).sort((a, b) => square(b) - square(a));
+    if (shown.length === 0) return null;
+    const row = (head: string, axes: readonly Float64Array[], part: number, kind = {}) =>
+      el("tr", kind, el("th", { scope: "row" }, head), ...axes.map((v) => sd(v[stone]!)), el("td", { class: "n" }, percent(part / total)));
+    return el("div", { class: "card" }, el("h4", {}, t("budgetTitle")),
+      el("table", { class: "numbers" },
+        el("thead", {}, el("tr", {}, ...[t("budgetTerm"), ...AXES, t("budgetShare")].map((text, i) =>
+          el("th", { scope: "col", ...(i ? { class: "n" } : {}) }, text)))),
+        el("tbody", {}, ...shown.map((n) => row(terms[n]!, stones.budget[n]!, square(n))),
+          row(t("budgetSum"), stones.sigma, total, { class: "sum" }))),
+      el("p", { class: "note" }, t("budgetNote")));
   }
 
   /** The displacement with the projections of its 95 % ellipsoid, from the front and from the side. */

@@ -20,7 +20,7 @@ use stonewise_core::geometry::FaceFrame;
 use stonewise_figure::{colours, nice_above};
 use stonewise_results::Comparison;
 use stonewise_results::records::DatumState;
-use stonewise_results::{Joint, JointMotion, ResultSet, RowMotion, Sorted, Status, StoneRow};
+use stonewise_results::{Joint, JointMotion, ResultSet, RowMotion, Sorted, Status, StoneRow, Term};
 
 /// The program; `web/README.md` says how it is built from its sources.
 pub(crate) const SCRIPT: &str = include_str!("../../assets/report.js");
@@ -99,6 +99,7 @@ fn document(results: &ResultSet, facts: &Summary, joints: &[Joint], blocks: Map<
         "decimals": facts.decimals(),
         "sound": facts.verdict.is_sound(),
         "registrationKnown": results.datum().is_some_and(|d| d.state != DatumState::Unknown),
+        "terms": terms(results).iter().map(|term| texts.terms[*term as usize]).collect::<Vec<_>>(),
         "truth": known_translation_mm(results),
         "blocks": blocks,
         "cameras": excerpts::cameras(results, &origin(results)),
@@ -191,6 +192,12 @@ fn motions(results: &ResultSet, facts: &Summary, block: &mut Block) {
     for (k, axis) in ["Along", "Up", "Out"].into_iter().enumerate() {
         block.i32(&format!("sigma{axis}"), MICROMETRE, of(&|s, m| sigma(s, m, k)));
     }
+    for (n, term) in terms(results).into_iter().enumerate() {
+        for (k, axis) in ["Along", "Up", "Out"].into_iter().enumerate() {
+            let sd = |m: &RowMotion| m.budget.variances(term)[k].max(0.0).sqrt();
+            block.i32(&format!("term{n}{axis}"), MICROMETRE, of(&|_, m| sd(m)));
+        }
+    }
     for (name, i, j) in [("corAlongUp", 0, 1), ("corAlongOut", 0, 2), ("corUpOut", 1, 2)] {
         let correlation = |s: &StoneRow, m: &RowMotion| {
             results.face_covariance(s, m)[(i, j)] / (sigma(s, m, i) * sigma(s, m, j))
@@ -218,6 +225,15 @@ fn motions(results: &ResultSet, facts: &Summary, block: &mut Block) {
             .map(|s| u8::from(sound && moved.contains(&s.stone_id))),
     );
     block.u8("loose", flag(|m| m.loose).map(|loose| loose * u8::from(sound)));
+}
+
+/// The terms of the budgets.
+fn terms(results: &ResultSet) -> Vec<Term> {
+    let motions = results.stones.iter().filter_map(|s| s.motion.as_ref());
+    let all: BTreeSet<Term> = motions
+        .flat_map(|m| m.budget.sds().map(|(term, _)| term))
+        .collect();
+    all.into_iter().collect()
 }
 
 /// Joints with their ends on the unrolled wall and in the world.
