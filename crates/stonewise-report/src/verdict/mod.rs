@@ -20,6 +20,7 @@ pub(crate) mod testing;
 mod tests;
 
 pub use evidence::verdict_on;
+pub(crate) use sentence::zone_in_words;
 pub(crate) use series::name as term_name;
 pub use series::{inseparable_in_words, series_verdict};
 
