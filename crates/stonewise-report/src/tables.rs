@@ -204,36 +204,30 @@ fn zones(later: &[EpochVerdict]) -> Result<Table, TableError> {
     table.push("kind", "", "what it resembles", kinds)?;
     let states: Vec<String> = all.iter().map(|z| z.1.state.word().to_owned()).collect();
     table.push("state", "", "its state", states)?;
-    let columns: [(&str, &str, &str, usize); 8] = [
-        ("along_m", "m", "middle along the unrolled wall", 0),
-        ("up_m", "m", "middle up the unrolled wall", 1),
-        ("extent_along_m", "m", "extent along the wall", 2),
-        ("extent_up_m", "m", "extent up the wall", 3),
-        ("area_m2", "m2", "area of the faces of its stones", 4),
-        ("largest_mm", "mm", "largest deformation of a stone", 5),
-        ("lower_mm", "mm", "lower end of its 95 % interval", 6),
-        ("upper_mm", "mm", "upper end of its 95 % interval", 7),
+    let against: Vec<String> = all.iter().map(|z| z.1.against.word().to_owned()).collect();
+    table.push("against", "", "what its motion counts from", against)?;
+    let diameters: Vec<Option<f64>> = all.iter().map(|z| z.1.diameter_m).collect();
+    table.push("diameter_m", "m", "diameter of a round zone", diameters)?;
+    type Column = (&'static str, &'static str, &'static str, fn(&DeformedZone) -> f64);
+    let columns: [Column; 8] = [
+        ("along_m", "m", "middle along the unrolled wall", |z| z.along_m),
+        ("up_m", "m", "middle up the unrolled wall", |z| z.up_m),
+        ("length_m", "m", "length", |z| z.length_m),
+        ("width_m", "m", "width", |z| z.width_m),
+        ("area_m2", "m2", "area of the faces of its stones", |z| z.area_m2),
+        ("largest_mm", "mm", "largest deformation of a stone", |z| {
+            z.largest_mm
+        }),
+        ("lower_mm", "mm", "lower end of its 95 % interval", |z| {
+            z.interval_mm[0]
+        }),
+        ("upper_mm", "mm", "upper end of its 95 % interval", |z| {
+            z.interval_mm[1]
+        }),
     ];
-    for (name, unit, meaning, k) in columns {
-        let value = |z: &DeformedZone| {
-            let [extent, interval] = [z.extent_m, z.interval_mm];
-            [
-                z.along_m,
-                z.up_m,
-                extent[0],
-                extent[1],
-                z.area_m2,
-                z.largest_mm,
-                interval[0],
-                interval[1],
-            ][k]
-        };
-        table.push(
-            name,
-            unit,
-            meaning,
-            all.iter().map(|z| value(&z.1)).collect::<Vec<f64>>(),
-        )?;
+    for (name, unit, meaning, of) in columns {
+        let values: Vec<f64> = all.iter().map(|z| of(&z.1)).collect();
+        table.push(name, unit, meaning, values)?;
     }
     Ok(table)
 }

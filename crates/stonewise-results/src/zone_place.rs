@@ -1,6 +1,8 @@
 //! Where a zone of deformation lies.
 
 use crate::StoneRow;
+use stonewise_core::id::StoneId;
+use stonewise_core::registration::DeformationZone;
 
 /// Place and size of a zone of deformation, of its stones.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,9 +16,9 @@ pub struct ZonePlace {
 }
 
 impl ZonePlace {
-    /// The place of the zone of this number among the stones of its pair of epochs.
-    pub fn of(zone: u32, rows: &[StoneRow]) -> Self {
-        let stones = || rows.iter().filter(|s| s.zone_id == zone);
+    /// The place of a zone among the stones of its pair of epochs.
+    pub fn of(zone: &DeformationZone, rows: &[StoneRow]) -> Self {
+        let stones = || Self::stones(zone, rows);
         let area_m2: f64 = stones().map(|s| s.area_m2).sum();
         let middle =
             |place: fn(&StoneRow) -> f64| stones().map(|s| place(s) * s.area_m2).sum::<f64>() / area_m2;
@@ -25,5 +27,11 @@ impl ZonePlace {
             area_m2,
             middle_m: [middle(|s| s.along_m), middle(|s| s.up_m)],
         }
+    }
+
+    /// The rows of the stones of a zone.
+    pub fn stones<'a>(zone: &'a DeformationZone, rows: &'a [StoneRow]) -> impl Iterator<Item = &'a StoneRow> {
+        let is_in_zone = |s: &&StoneRow| zone.stones.binary_search(&StoneId(s.stone_id)).is_ok();
+        rows.iter().filter(is_in_zone)
     }
 }

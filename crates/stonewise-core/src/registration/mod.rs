@@ -20,7 +20,7 @@ pub use adjustment::{
     StoneEvidence, StonePhotoReport, VarianceComponents, adjust, adjust_with_photos,
 };
 pub use deformation::{
-    Deformation, DeformationZone, StoneDeformation, ZONE_EXTENTS_M, ZoneKind, deformation,
+    Against, Deformation, DeformationZone, StoneDeformation, ZONE_EXTENTS_M, ZoneKind, deformation,
 };
 pub use gicp::{GicpBlock, GicpParams, GicpStone, align, relate_to_neighbours};
 pub use moved::moved_stones;

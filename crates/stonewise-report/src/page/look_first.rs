@@ -1,14 +1,15 @@
-//! What to look at first: the worst of what moved, is loose, opened or is lost.
+//! What to look at first: the worst of what deformed, moved, is loose, opened or is lost.
 
 use super::html::with_units;
 use crate::summary::Summary;
 use crate::texts::fill;
+use crate::verdict::zone_in_words;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
-use stonewise_results::records::{EpochVerdict, JointVerdict, State, StoneVerdict};
+use stonewise_results::records::{DeformedZone, EpochVerdict, JointVerdict, State, StoneVerdict};
 use stonewise_results::{ResultSet, StoneRow};
 
-/// Stones and joints that are named at most.
+/// Zones, stones and joints that are named at most.
 const FIRST: usize = 5;
 
 /// Something that calls for a closer look.
@@ -16,6 +17,7 @@ const FIRST: usize = 5;
 enum Look<'a> {
     Stone(&'a StoneVerdict),
     Joint(&'a JointVerdict),
+    Zone(&'a DeformedZone),
 }
 
 /// A [`Look`] among its kind: state, size in millimetres, number of the stone.
@@ -26,7 +28,7 @@ struct Ranked<'a> {
     id: u32,
 }
 
-/// The stones and joints that call for a closer look, the worst first; of a run in doubt none.
+/// The zones of deformation, stones and joints that call for a closer look, the worst first; of a run in doubt none.
 pub(super) fn look_first(results: &ResultSet, facts: &Summary) -> String {
     let texts = facts.texts();
     if !facts.verdict.is_sound() {
@@ -36,6 +38,7 @@ pub(super) fn look_first(results: &ResultSet, facts: &Summary) -> String {
     let item = |look: &Look| match look {
         Look::Stone(verdict) => Some(stone(verdict, rows.get(&verdict.stone_id)?, facts)),
         Look::Joint(verdict) => Some(joint(verdict, facts)),
+        Look::Zone(verdict) => Some(zone(verdict, facts)),
     };
     let items: String = worst(&facts.verdict)
         .iter()
@@ -69,13 +72,13 @@ fn worst(verdict: &EpochVerdict) -> Vec<Look<'_>> {
     looks
         .filter(|look| match look {
             Look::Stone(stone) => seen.insert(stone.stone_id),
-            Look::Joint(_) => true,
+            Look::Joint(_) | Look::Zone(_) => true,
         })
         .collect()
 }
 
-/// Stones that moved, are loose, are lost, and joints that opened beyond a threshold.
-fn kinds(verdict: &EpochVerdict) -> [Vec<Ranked<'_>>; 4] {
+/// Zones that deformed, stones that moved, are loose, are lost, and joints that opened beyond a threshold.
+fn kinds(verdict: &EpochVerdict) -> [Vec<Ranked<'_>>; 5] {
     let stones = |is: fn(&StoneVerdict) -> bool, size: fn(&StoneVerdict) -> Option<f64>| {
         let stones = verdict.stones.iter().filter(|s| is(s));
         let ranked = stones.map(|stone| Ranked {
@@ -93,7 +96,15 @@ fn kinds(verdict: &EpochVerdict) -> [Vec<Ranked<'_>>; 4] {
         size_mm: joint.opening_mm,
         id: joint.stones[0],
     });
+    let deformed = verdict.deformation.iter().flat_map(|d| &d.zones);
+    let zones = deformed.map(|zone| Ranked {
+        look: Look::Zone(zone),
+        state: zone.state,
+        size_mm: zone.largest_mm,
+        id: zone.zone_id,
+    });
     [
+        zones.collect(),
         stones(|s| s.moved, |s| s.length_mm),
         stones(|s| s.loose, |s| s.neighbours_mm),
         stones(|s| s.lost, |_| None),
@@ -148,6 +159,22 @@ fn joint(verdict: &JointVerdict, facts: &Summary) -> String {
     measured(&text, Some(verdict.opening_mm), Some(verdict.interval_mm), facts)
 }
 
+/// A zone of deformation, its place, and what it did.
+fn zone(verdict: &DeformedZone, facts: &Summary) -> String {
+    let (texts, page) = (facts.texts(), &facts.texts().page);
+    let place = [
+        ("along", &*texts.number(verdict.along_m, 2)),
+        ("up", &*texts.number(verdict.up_m, 2)),
+    ];
+    format!(
+        "<a href=\"#maps\">{} {}</a>, {}: {}",
+        page.zone,
+        verdict.zone_id,
+        fill(page.along_up, &place),
+        zone_in_words(verdict, texts)
+    )
+}
+
 /// The text with a length and its interval, millimetres.
 fn measured(text: &str, length: Option<f64>, interval: Option<[f64; 2]>, facts: &Summary) -> String {
     let mm = |millimetres: f64| facts.texts().mm(millimetres / 1e3);
@@ -159,6 +186,8 @@ fn measured(text: &str, length: Option<f64>, interval: Option<[f64; 2]>, facts: 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stonewise_core::registration::{Against, ZoneKind};
+    use stonewise_results::records::DeformationVerdict;
 
     #[test]
     fn no_kind_hides_another_and_alarms_come_first() {
@@ -201,13 +230,32 @@ mod tests {
                 joint([2, 3], State::Attention),
                 joint([4, 5], State::Alarm),
             ],
+            deformation: Some(DeformationVerdict {
+                zones: vec![DeformedZone {
+                    zone_id: 1,
+                    state: State::Attention,
+                    kind: ZoneKind::Bulge,
+                    against: Against::RestOfWall,
+                    along_m: 1.0,
+                    up_m: 2.0,
+                    diameter_m: None,
+                    length_m: 2.0,
+                    width_m: 1.0,
+                    area_m2: 1.5,
+                    mean_mm: [0.0, 0.0, 2.0],
+                    largest_mm: 3.0,
+                    interval_mm: [2.0, 4.0],
+                }],
+                ..DeformationVerdict::default()
+            }),
             ..EpochVerdict::default()
         };
         let found = worst(&verdict).into_iter().map(|look| match look {
             Look::Stone(stone) => vec![stone.stone_id],
             Look::Joint(joint) => joint.stones.to_vec(),
+            Look::Zone(zone) => vec![100 + zone.zone_id],
         });
-        let expected: [&[u32]; 8] = [&[4], &[6], &[4, 5], &[3], &[5], &[2], &[1], &[2, 3]];
+        let expected: [&[u32]; 9] = [&[4], &[6], &[4, 5], &[3], &[5], &[2], &[101], &[1], &[2, 3]];
         assert_eq!(found.collect::<Vec<_>>(), expected);
     }
 }

@@ -95,16 +95,8 @@ fn joint(results: &ResultSet, joint: &Joint) -> Option<JointCase> {
 fn deformation(results: &ResultSet) -> Option<DeformationVerdict> {
     let record = results.registration.as_ref()?.deformation.as_ref()?;
     let zone = |zone: &DeformationZone| {
-        let stones = || results.stones.iter().filter(|s| s.zone_id == zone.number);
-        let place = ZonePlace::of(zone.number, &results.stones);
-        let extent = |of: fn(&StoneRow) -> f64| {
-            let half = |s: &StoneRow| 0.5 * s.area_m2.sqrt();
-            let low = stones().map(|s| of(s) - half(s)).fold(f64::INFINITY, f64::min);
-            let high = stones()
-                .map(|s| of(s) + half(s))
-                .fold(f64::NEG_INFINITY, f64::max);
-            high - low
-        };
+        let place = ZonePlace::of(zone, &results.stones);
+        let metres = |m: f64| millimetres(m) / 1e3;
         if place.area_m2 <= 0.0 {
             return None;
         }
@@ -113,10 +105,14 @@ fn deformation(results: &ResultSet) -> Option<DeformationVerdict> {
             state: State::default(),
             decided_by: None,
             kind: zone.kind,
-            along_m: millimetres(place.middle_m[0]) / 1e3,
-            up_m: millimetres(place.middle_m[1]) / 1e3,
-            extent_m: [extent(|s| s.along_m), extent(|s| s.up_m)].map(|m| millimetres(m) / 1e3),
+            against: zone.against,
+            along_m: metres(place.middle_m[0]),
+            up_m: metres(place.middle_m[1]),
+            diameter_m: zone.diameter_m.map(metres),
+            length_m: metres(zone.length_m),
+            width_m: metres(zone.width_m),
             area_m2: (1e4 * place.area_m2).round() / 1e4,
+            mean_mm: zone.mean_m.map(millimetres).into(),
             largest_mm: millimetres(zone.largest_m),
             interval_mm: zone.interval_m.map(millimetres),
         })

@@ -23,6 +23,7 @@ mod tests;
 mod time;
 
 pub use evidence::{Pair, verdict_on};
+pub(crate) use sentence::zone_in_words;
 pub(crate) use series::name as term_name;
 pub use series::{inseparable_in_words, series_verdict};
 pub use time::Course;

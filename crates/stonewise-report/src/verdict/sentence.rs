@@ -7,9 +7,9 @@ use super::limits::{Placed, in_words, of_attention};
 use crate::texts::{Texts, counted, fill};
 use stonewise_base::report_params::Language;
 use stonewise_base::thresholds::{Level, Quantity, Thresholds};
-use stonewise_core::registration::ZONE_EXTENTS_M;
+use stonewise_core::registration::{ZONE_EXTENTS_M, ZoneKind};
 use stonewise_figure::count;
-use stonewise_results::records::{Area, Largest, Reason, ReasonCode, State};
+use stonewise_results::records::{Area, DeformedZone, Largest, Reason, ReasonCode, State};
 
 /// What the clauses are made from.
 struct Speaker<'a> {
@@ -197,20 +197,7 @@ impl Speaker<'_> {
             }));
         };
 
-        let [width, height] = zone
-            .extent_m
-            .map(|m| self.texts.threshold((10.0 * m).round() / 10.0));
-        let [low, high] = zone.interval_mm.map(mm);
-        Some(fill(
-            c.shape[zone.kind as usize],
-            &[
-                ("width", &*width),
-                ("height", &*height),
-                ("length", &*mm(zone.largest_mm)),
-                ("low", &*low),
-                ("high", &*high),
-            ],
-        ))
+        Some(zone_in_words(zone, self.texts))
     }
 
     fn reaching(&self) -> String {
@@ -314,4 +301,35 @@ impl Speaker<'_> {
             &values,
         ))
     }
+}
+
+/// What a zone of deformation did, how large it is, and against what it moved.
+pub(crate) fn zone_in_words(zone: &DeformedZone, texts: &Texts) -> String {
+    let c = &texts.clauses;
+    let figure = |value: f64| texts.mm(value / 1e3);
+    let size = match zone.diameter_m {
+        Some(diameter_m) => fill(c.diameter, &[("diameter", &*figure(diameter_m))]),
+        None => fill(
+            c.sides,
+            &[
+                ("length", &*figure(zone.length_m)),
+                ("width", &*figure(zone.width_m)),
+            ],
+        ),
+    };
+    let did = match zone.kind {
+        ZoneKind::Bulge if zone.mean_mm[2] < 0.0 => c.pressed_in,
+        kind => c.shape[kind as usize],
+    };
+    let [low, high] = zone.interval_mm.map(figure);
+    fill(
+        did,
+        &[
+            ("size", &*size),
+            ("against", c.against[zone.against as usize]),
+            ("length", &*figure(zone.largest_mm)),
+            ("low", &*low),
+            ("high", &*high),
+        ],
+    )
 }

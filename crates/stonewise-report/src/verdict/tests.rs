@@ -7,7 +7,7 @@ use super::testing::Normal;
 use nalgebra::{Matrix3, Point2, Vector3};
 use stonewise_base::report_params::Language;
 use stonewise_base::thresholds::{Quantity, Thresholds};
-use stonewise_core::registration::ZoneKind;
+use stonewise_core::registration::{Against, ZoneKind};
 use stonewise_core::statistics::q_values;
 use stonewise_results::detection_limit_m;
 use stonewise_results::records::{
@@ -406,7 +406,11 @@ pub(super) fn bulged(is_bulged: bool) -> Case {
         kind: ZoneKind::Bulge,
         along_m: 4.0,
         up_m: 2.0,
-        extent_m: [2.13, 1.4],
+        against: Against::RestOfWall,
+        diameter_m: None,
+        length_m: 2.13,
+        width_m: 1.4,
+        mean_mm: [0.0, 0.0, 1.2],
         area_m2: 2.2,
         largest_mm: 1.9,
         interval_mm: [1.7, 2.1],

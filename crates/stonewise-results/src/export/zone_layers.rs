@@ -1,7 +1,7 @@
 //! The zones of deformation as layers of polygons.
 
 use super::layer_style::zone_style;
-use crate::{ResultSet, StoneOutline, StoneRow, ZonePlace};
+use crate::{ResultSet, StoneOutline, ZonePlace};
 use nalgebra::{Point2, Point3, Vector3};
 use stonewise_core::geometry::convex_hull;
 use stonewise_core::registration::DeformationZone;
@@ -42,7 +42,10 @@ pub(super) fn zone_layers(
         Ok::<_, TableError>(Layer {
             name: numbered(name),
             title: titled(title),
-            description: "zones of deformation: convex hulls of the outlines of their stones; metres".into(),
+            description:
+                "zones of deformation, of the part above half of the peak: convex hulls of the outlines of \
+                          its stones; metres"
+                    .into(),
             geometry,
             crs,
             attributes: attributes(&zones)?,
@@ -71,10 +74,9 @@ pub(super) fn zone_layers(
 
 /// The hull of a zone's stones; `None` where no stone has an outline.
 fn outlined<'a>(results: &ResultSet, zone: &'a DeformationZone) -> Option<Outlined<'a>> {
-    let is_in_zone = |s: &&StoneRow| s.zone_id == zone.number;
     let mut corners: Vec<(Point2<f64>, Point3<f64>)> = Vec::new();
     let mut normal = Vector3::zeros();
-    for stone in results.stones.iter().filter(is_in_zone) {
+    for stone in ZonePlace::stones(zone, &results.stones) {
         if let Some(outline) = results.outlines.get(&stone.stone_id) {
             corners.extend(
                 results
@@ -94,7 +96,7 @@ fn outlined<'a>(results: &ResultSet, zone: &'a DeformationZone) -> Option<Outlin
     };
     Some(Outlined {
         zone,
-        place: ZonePlace::of(zone.number, &results.stones),
+        place: ZonePlace::of(zone, &results.stones),
         world: hull.seen_from_above(),
         facade,
     })
@@ -112,6 +114,8 @@ fn attributes(zones: &[Outlined]) -> Result<Table, TableError> {
         numbers(|z| z.zone.number),
     )?;
     table.push("kind", "", "what the deformation resembles", kinds)?;
+    let against: Vec<String> = zones.iter().map(|z| z.zone.against.word().to_owned()).collect();
+    table.push("against", "", "what its motion counts from", against)?;
     table.push("stones", "", "number of stones", numbers(|z| z.place.stones))?;
     table.push(
         "area_m2",
@@ -120,6 +124,10 @@ fn attributes(zones: &[Outlined]) -> Result<Table, TableError> {
         reals(|z| z.place.area_m2),
     )?;
 
+    let diameters: Vec<Option<f64>> = zones.iter().map(|z| z.zone.diameter_m).collect();
+    table.push("diameter_m", "m", "diameter of a round zone", diameters)?;
+    table.push("length_m", "m", "length", reals(|z| z.zone.length_m))?;
+    table.push("width_m", "m", "width", reals(|z| z.zone.width_m))?;
     table.push(
         "largest_m",
         "m",
@@ -147,14 +155,12 @@ mod tests {
     use super::*;
     use crate::records::DeformationRecord;
     use crate::testing::{folder, registration_record, rows};
-    use stonewise_core::registration::ZoneKind;
+    use stonewise_core::id::StoneId;
+    use stonewise_core::registration::{Against, ZoneKind};
 
     #[test]
     fn a_zone_is_outlined_around_all_outlines_of_its_stones() {
-        let mut stones = rows();
-        stones
-            .iter_mut()
-            .for_each(|s| s.zone_id = u32::from(s.stone_id < 10));
+        let stones = rows();
         let folder = folder(&stones);
         let mut results = ResultSet::read(folder.path()).unwrap();
         let named = |name: &str| name.to_owned();
@@ -170,8 +176,12 @@ mod tests {
                 largest_m: 0.02,
                 interval_m: [0.018, 0.022],
                 mean_m: Vector3::x() * 0.01,
-                stones: Vec::new(),
+                stones: (1..10).map(StoneId).collect(),
+                diameter_m: None,
+                length_m: 2.0,
+                width_m: 1.0,
                 kind: ZoneKind::Bulge,
+                against: Against::RestOfWall,
             }],
         });
         results.registration = Some(record);
@@ -186,7 +196,7 @@ mod tests {
         );
         let hull = &layers[1].vertices[0];
         // By brute force: every corner of the zone's outlines lies to the left of every edge.
-        for stone in results.stones.iter().filter(|s| s.zone_id == 1) {
+        for stone in results.stones.iter().filter(|s| s.stone_id < 10) {
             for p in results.unrolled(stone) {
                 for (k, a) in hull.iter().enumerate() {
                     let b = hull[(k + 1) % hull.len()];

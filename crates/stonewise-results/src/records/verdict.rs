@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
 use stonewise_base::thresholds::{Quantity, Threshold, Thresholds};
-use stonewise_core::registration::ZoneKind;
+use stonewise_core::registration::{Against, ZoneKind};
 use stonewise_core::series::Answer;
 
 /// Version of the file's layout.
@@ -394,7 +394,7 @@ pub struct DeformationVerdict {
     pub zones: Vec<DeformedZone>,
 }
 
-/// A zone of deformation.
+/// A zone of deformation: the part of the wall that moved by more than half of a peak.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DeformedZone {
     /// Number of the zone, as in the stone table.
@@ -406,14 +406,21 @@ pub struct DeformedZone {
     pub decided_by: Option<Decision>,
     /// What it resembles.
     pub kind: ZoneKind,
+    /// What its motion counts from.
+    pub against: Against,
     /// Middle along the unrolled wall, metres.
     pub along_m: f64,
     /// Middle up the unrolled wall, metres.
     pub up_m: f64,
-    /// Extent along and up, metres.
-    pub extent_m: [f64; 2],
+    /// Diameter, metres; null unless it is round.
+    pub diameter_m: Option<f64>,
+    /// Length and width, metres.
+    pub length_m: f64,
+    pub width_m: f64,
     /// Area of the faces of its stones.
     pub area_m2: f64,
+    /// Mean deformation along the wall, up and out.
+    pub mean_mm: [f64; 3],
     /// Largest deformation of a stone.
     pub largest_mm: f64,
     /// Its 95 % interval.
@@ -551,8 +558,12 @@ mod tests {
                     kind: ZoneKind::Bulge,
                     along_m: 1.0,
                     up_m: 2.0,
-                    extent_m: [2.0, 1.0],
+                    against: Against::RestOfWall,
+                    diameter_m: Some(1.4),
+                    length_m: 1.5,
+                    width_m: 1.3,
                     area_m2: 1.5,
+                    mean_mm: [0.0, 0.0, 2.0],
                     largest_mm: 3.0,
                     interval_mm: [2.0, 4.0],
                 }],

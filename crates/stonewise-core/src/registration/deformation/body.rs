@@ -203,6 +203,11 @@ impl<'a> Body<'a> {
         }
     }
 
+    /// Distance of neighbours, metres.
+    pub fn step_m(&self) -> f64 {
+        self.motions.step_m
+    }
+
     /// The pattern of the equations of the field. `None` where memory does not suffice.
     pub fn pattern(&self) -> Option<BlockPattern<9>> {
         BlockPattern::new(self.motions.stones.len(), &self.motions.edges)

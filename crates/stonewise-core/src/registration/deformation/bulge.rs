@@ -115,6 +115,7 @@ impl Bulge {
 
         Some(MostLikely {
             stones: stones.copied().collect(),
+            diameter_m: self.diameter_m,
             direction: number,
             amplitude_m: direction.amplitude_m(score[number]),
             amplitude_sd_m: direction.amplitude_sd_m(),
@@ -142,6 +143,7 @@ pub(super) fn add_squares(
 pub(super) struct MostLikely {
     /// Stones that move by more than a quarter of its amplitude, with their share of it.
     pub stones: Vec<(usize, f64)>,
+    pub diameter_m: f64,
     /// Its direction: along, up or out.
     pub direction: usize,
     pub amplitude_m: f64,

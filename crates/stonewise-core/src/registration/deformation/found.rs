@@ -25,7 +25,7 @@ pub struct Deformation {
     /// Smallest motion of a zone in the face that is found in 95 of 100 cases, along the wall or up, whichever is found
     /// worse, in the median over the wall, for each of [`ZONE_EXTENTS_M`]; `None` where the wall is smaller. Metres.
     pub limits_in_face_m: [Option<f64>; 3],
-    /// Connected zones that deformed, the one of the largest motion first; none unless `p` is at most 1 %.
+    /// Zones that deformed, the one of the largest motion first; none unless `p` is at most 1 %.
     pub zones: Vec<DeformationZone>,
 }
 
@@ -48,7 +48,7 @@ pub struct StoneDeformation {
     /// The part of it that allows for what the field of motions has smoothed of a zone, m^2; it errs alike in epochs
     /// that show the same motion.
     pub smoothed: Matrix3<f64>,
-    /// Number of its zone, 0 for none.
+    /// Number of its zone, of several that of the largest deformation, 0 for none.
     pub zone: u32,
 }
 
@@ -59,13 +59,19 @@ impl StoneDeformation {
     }
 }
 
-/// A zone that deformed.
+/// A zone that deformed: the stones around a peak of the deformation that moved by more than half of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DeformationZone {
     /// From 1.
     pub number: u32,
     /// Its stones, ascending.
     pub stones: Vec<StoneId>,
+    /// Diameter of a round zone, whose length and width differ by less than the distance of neighbours, metres.
+    pub diameter_m: Option<f64>,
+    /// Length of the ellipse of the same second moments, metres.
+    pub length_m: f64,
+    /// Its width, metres.
+    pub width_m: f64,
     /// Length of the largest deformation, metres.
     pub largest_m: f64,
     /// Its 95 % interval, metres.
@@ -74,26 +80,24 @@ pub struct DeformationZone {
     pub mean_m: Vector3<f64>,
     /// What it resembles.
     pub kind: ZoneKind,
+    /// What its motion counts from.
+    pub against: Against,
 }
 
 /// What a zone of deformation resembles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ZoneKind {
-    /// It moved out of the wall, most in its middle.
+    /// It moved out of the wall or into it, most in its middle.
     Bulge,
-    /// It moved into the wall, most in its middle.
-    Dent,
     /// It moved out of the wall or into it, more and more towards one side.
-    Tilt,
+    Lean,
     /// It sank.
     Settlement,
-    /// It rose.
-    Heave,
-    /// It moved along the wall.
-    Slide,
-    /// Its stones moved in opposite directions.
-    Distortion,
+    /// It moved out of the wall or into it as a whole.
+    Step,
+    /// It rose or moved along the wall.
+    Other,
 }
 
 impl ZoneKind {
@@ -101,12 +105,30 @@ impl ZoneKind {
     pub fn word(self) -> &'static str {
         match self {
             Self::Bulge => "bulge",
-            Self::Dent => "dent",
-            Self::Tilt => "tilt",
+            Self::Lean => "lean",
             Self::Settlement => "settlement",
-            Self::Heave => "heave",
-            Self::Slide => "slide",
-            Self::Distortion => "distortion",
+            Self::Step => "step",
+            Self::Other => "other",
+        }
+    }
+}
+
+/// What the motion of a zone counts from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Against {
+    /// The part of the wall that kept its shape.
+    RestOfWall,
+    /// That of its own part of the wall, where no ties join all parts.
+    RestOfPart,
+}
+
+impl Against {
+    /// The word in result files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::RestOfWall => "rest_of_wall",
+            Self::RestOfPart => "rest_of_part",
         }
     }
 }

@@ -4,15 +4,21 @@
 //! Errors that all stones share, the datum above all, drop out of it; those of single stations, strips and photos
 //! stay in as far as they differ between the stones. The rigid part is the largest congruent one (`rigid_part`).
 //! Whether the wall deformed at all is tested by the most likely bulge of any place, size and direction
-//! (`scan`), and where it did follows from its stones (`zones`). Congruence tests of point networks: Pelzer 1971,
-//! Niemeier 1981.
+//! (`scan`), and where it did follows from the peaks of its stones' deformation (`zones`). Congruence tests of point
+//! networks: Pelzer 1971, Niemeier 1981.
 
+mod areas;
 mod body;
 mod bulge;
+mod extent;
 mod found;
+mod frames;
 mod rigid_part;
 mod scan;
+mod shape;
 mod shared_errors;
+#[cfg(test)]
+mod size_tests;
 mod smoothed;
 #[cfg(test)]
 mod tests;
@@ -24,11 +30,11 @@ use crate::id::StoneId;
 use crate::progress::{Interrupted, Progress};
 use body::Body;
 use found::LEVEL;
-pub use found::{Deformation, DeformationZone, StoneDeformation, ZONE_EXTENTS_M, ZoneKind};
+pub use found::{Against, Deformation, DeformationZone, StoneDeformation, ZONE_EXTENTS_M, ZoneKind};
 use rigid_part::{RigidPart, rigid_part};
 use scan::{Scan, scan};
 use std::collections::BTreeMap;
-use zones::zones;
+use zones::Wall;
 
 /// Fewest stones of a part of the wall whose shape is judged: four times what a rigid motion needs.
 const LEAST_STONES: usize = 12;
@@ -67,6 +73,10 @@ pub fn deformation(
         found.limits_in_face_m = scan.limits_in_face_m;
     }
     let mut by_stone: BTreeMap<StoneId, StoneDeformation> = BTreeMap::new();
+    let against = match judged.len() {
+        1 => Against::RestOfWall,
+        _ => Against::RestOfPart,
+    };
     for (body, rigid, scan) in &mut judged {
         let is_shown = scan.p * count <= LEVEL;
         if is_shown {
@@ -85,14 +95,18 @@ pub fn deformation(
             by_stone.insert(stone.id, row);
         }
         if is_shown {
-            found.zones.extend(zones(body, rigid, scan));
+            let wall = Wall::new(body, rigid, against);
+            match wall.zones() {
+                zones if zones.is_empty() => found.zones.push(wall.bulge(scan)),
+                zones => found.zones.extend(zones),
+            }
         }
     }
     found.zones.sort_by(|a, b| b.largest_m.total_cmp(&a.largest_m));
     for (number, zone) in (1..).zip(&mut found.zones) {
         zone.number = number;
         for stone in &zone.stones {
-            if let Some(row) = by_stone.get_mut(stone) {
+            if let Some(row) = by_stone.get_mut(stone).filter(|row| row.zone == 0) {
                 row.zone = number;
             }
         }

@@ -11,35 +11,63 @@ use stonewise_testing::normal;
 const COLUMNS: usize = 10;
 const ROWS: usize = 8;
 /// Error of a stone along each axis, metres.
-const SD_M: f64 = 1e-4;
+pub(super) const SD_M: f64 = 1e-4;
+
+/// A wall of equal stones in rows and columns; x is out of it.
+pub(super) struct Grid {
+    pub columns: usize,
+    pub rows: usize,
+    /// Width and height of a stone, metres.
+    pub stone_m: [f64; 2],
+}
+
+const GRID: Grid = Grid {
+    columns: COLUMNS,
+    rows: ROWS,
+    stone_m: [0.3, 0.2],
+};
+
+impl Grid {
+    pub fn count(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    pub fn place(&self, k: usize) -> Point3<f64> {
+        Point3::new(
+            0.02 * (k % 3) as f64,
+            self.stone_m[0] * (k % self.columns) as f64,
+            self.stone_m[1] * (k / self.columns) as f64,
+        )
+    }
+
+    /// Neighbours in rows and columns.
+    fn edges(&self) -> Vec<(usize, usize)> {
+        let mut edges = Vec::new();
+        for k in 0..self.count() {
+            if k % self.columns + 1 < self.columns {
+                edges.push((k, k + 1));
+            }
+            if k + self.columns < self.count() {
+                edges.push((k, k + self.columns));
+            }
+        }
+        edges.sort_unstable();
+        edges
+    }
+}
 
 fn place(k: usize) -> Point3<f64> {
-    Point3::new(
-        0.02 * (k % 3) as f64,
-        0.3 * (k % COLUMNS) as f64,
-        0.2 * (k / COLUMNS) as f64,
-    )
+    GRID.place(k)
 }
 
-/// Neighbours in rows and columns.
-fn edges() -> Vec<(usize, usize)> {
-    let mut edges = Vec::new();
-    for k in 0..COLUMNS * ROWS {
-        if k % COLUMNS + 1 < COLUMNS {
-            edges.push((k, k + 1));
-        }
-        if k + COLUMNS < COLUMNS * ROWS {
-            edges.push((k, k + COLUMNS));
-        }
-    }
-    edges.sort_unstable();
-    edges
-}
-
-/// A wall whose stones moved so, each measured with an error of its own; x is out of the wall.
 fn wall(moved: impl Fn(usize) -> Vector3<f64>, error: impl Fn(usize) -> Vector3<f64>) -> JointMotions {
-    let edges = edges();
-    let mut information = BlockPattern::<9>::new(COLUMNS * ROWS, &edges).unwrap().zeros();
+    wall_of(&GRID, |k| moved(k) + error(k))
+}
+
+/// A wall for whose stones these motions are measured.
+pub(super) fn wall_of(grid: &Grid, measured: impl Fn(usize) -> Vector3<f64>) -> JointMotions {
+    let edges = grid.edges();
+    let mut information = BlockPattern::<9>::new(grid.count(), &edges).unwrap().zeros();
     information
         .diagonal
         .iter_mut()
@@ -47,10 +75,10 @@ fn wall(moved: impl Fn(usize) -> Vector3<f64>, error: impl Fn(usize) -> Vector3<
     let of_stone = Matrix3::identity() / (SD_M * SD_M);
 
     let stone = |k: usize| {
-        let displacement = moved(k) + error(k);
+        let displacement = measured(k);
         Some(JointStone {
             id: StoneId(k as u32 + 1),
-            place: place(k),
+            place: grid.place(k),
             face_from_world: Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0),
             body: 1,
             is_loose: false,
@@ -69,8 +97,8 @@ fn wall(moved: impl Fn(usize) -> Vector3<f64>, error: impl Fn(usize) -> Vector3<
         on_stone: Matrix3::identity(),
     };
     JointMotions {
-        pulls: (0..COLUMNS * ROWS).map(pull).collect(),
-        stones: (0..COLUMNS * ROWS).map(stone).collect(),
+        pulls: (0..grid.count()).map(pull).collect(),
+        stones: (0..grid.count()).map(stone).collect(),
         edges,
         information,
         poses: DMatrix::zeros(0, 0),
@@ -343,13 +371,13 @@ fn kinds_of_risen(risen_m: impl Fn(usize) -> f64) -> Vec<ZoneKind> {
 }
 
 #[test]
-fn a_zone_whose_stones_rose_and_sank_is_distorted() {
+fn what_rose_and_what_sank_beside_it_are_two_zones() {
     let kinds = kinds_of_risen(|k| match k % COLUMNS {
-        3 | 4 => 0.003,
+        3 | 4 => 0.004,
         5 | 6 => -0.003,
         _ => 0.0,
     });
-    assert_eq!(kinds, [ZoneKind::Distortion]);
+    assert_eq!(kinds, [ZoneKind::Other, ZoneKind::Settlement]);
 }
 
 #[test]
@@ -408,8 +436,8 @@ fn the_larger_end_of_a_settlement_without_a_crack_is_the_part_that_kept_its_shap
         let apart = stone.deformation - moved(k);
         assert!(apart.norm() < 6.0 * SD_M, "{k}: {apart:?}");
         let share = moved(k).z / -0.0025;
-        assert!(share < 0.5 || stone.zone == 1, "{k}");
-        assert!(share > 0.0 || stone.zone == 0, "{k}");
+        assert!(share < 0.6 || stone.zone == 1, "{k}");
+        assert!(share > 0.4 || stone.zone == 0, "{k}");
     }
     assert_eq!(found.zones[0].kind, ZoneKind::Settlement);
 }

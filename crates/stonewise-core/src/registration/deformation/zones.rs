@@ -1,183 +1,215 @@
-//! Zones that deformed: connected stones whose deformation is not zero.
+//! Zones that deformed: areas around peaks of the deformation along the wall, up and out.
 
+use super::areas::{Area, HALF, Motion};
 use super::body::Body;
-use super::found::{DeformationZone, OUTSIDE, ZoneKind};
+use super::extent::Extent;
+use super::found::{Against, DeformationZone, OUTSIDE, ZoneKind};
+use super::frames::frames;
 use super::rigid_part::RigidPart;
 use super::scan::Scan;
-use crate::components::components;
-use crate::geometry::FaceFrame;
+use super::shape::shape;
+use crate::registration::bulges::OUT;
 use crate::statistics::{chi_square_p, discoveries};
 use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeSet;
 
-/// Share of false discoveries that is accepted among the stones of all zones.
+/// Share of false discoveries that is accepted among the motions of all stones in the three directions.
 const FALSE_DISCOVERY_RATE: f64 = 0.05;
-/// Fewer connected stones are no zone: one or two that differ from their surroundings are judged as loose stones are.
-const LEAST_STONES: usize = 3;
-/// Share of the variance of the motion across a zone that a plane must explain to call it a tilt.
-const TILTED: f64 = 0.8;
-/// Least standard deviation of the motion across a tilted zone, as a share of its mean: half of what a tilt about one
-/// side has.
-const UNEVEN: f64 = 0.3;
-/// Least mean of a zone's motions, as a share of the mean of their sizes, for the zone to have moved in one direction:
-/// three quarters of the motion has one sign.
-const ONE_WAY: f64 = 0.5;
-/// Fewest stones that show a tilt.
-const TILT_STONES: usize = 6;
-/// Cosine of the angle to the vertical above which a face lies level, as on a step or a crest.
-const LEVEL: f64 = 0.7;
+/// Number of the direction up the wall.
+const UP: usize = 1;
 
-/// The zones of a body that deformed; their numbers are left open.
-///
-/// Stones are tested one by one with the false discovery rate controlled over the body (Benjamini & Hochberg 1995; tests
-/// of stones that share errors are positively dependent). Fewer than three connected stones, or stones whose interval
-/// begins at zero, are no zone. If none is left, the zone is the most likely bulge, with the amplitude that the stones'
-/// own observations give it, as the field smooths weak motions.
-pub(super) fn zones(body: &Body, rigid: &RigidPart, scan: &Scan) -> Vec<DeformationZone> {
-    let p = |(i, square): (usize, &f64)| body.stones[i].is_firm.then(|| chi_square_p(*square, 3));
-    let p_values: Vec<Option<f64>> = rigid.squares.iter().enumerate().map(p).collect();
-    let moved: BTreeSet<usize> = discoveries(&p_values, FALSE_DISCOVERY_RATE).into_iter().collect();
-    let mut next = vec![Vec::new(); body.stones.len()];
-    for [low, high] in &body.neighbours {
-        if moved.contains(low) && moved.contains(high) {
-            next[*low].push(*high);
-            next[*high].push(*low);
+/// A body and how its stones deformed.
+pub(super) struct Wall<'a> {
+    body: &'a Body<'a>,
+    rigid: &'a RigidPart,
+    against: Against,
+    /// Neighbours of each stone that count for the shape of the wall.
+    next: Vec<Vec<usize>>,
+    /// Takes world components to along, up and out.
+    frames: Vec<Matrix3<f64>>,
+}
+
+impl<'a> Wall<'a> {
+    pub fn new(body: &'a Body, rigid: &'a RigidPart, against: Against) -> Self {
+        let mut next = vec![Vec::new(); body.stones.len()];
+        for [low, high] in &body.neighbours {
+            if body.stones[*low].is_firm && body.stones[*high].is_firm {
+                next[*low].push(*high);
+                next[*high].push(*low);
+            }
+        }
+        Self {
+            frames: frames(body, &next),
+            body,
+            rigid,
+            against,
+            next,
         }
     }
-    let parts = components(next.len(), |stone| next[stone].iter().copied());
-    let of_part = |stones: &Vec<usize>| {
-        let zone = (stones.len() >= LEAST_STONES).then(|| zone(body, rigid, stones))?;
-        (zone.interval_m[0] > 0.0).then_some(zone)
-    };
-    let found: Vec<DeformationZone> = parts.iter().filter_map(of_part).collect();
-    match found.is_empty() {
-        true => vec![bulge(body, scan)],
-        false => found,
+
+    /// The zones that deformed, the one of the largest motion first; their numbers are left open.
+    ///
+    /// The motions along, up and out of each stone are tested with the false discovery rate controlled over the body
+    /// (Benjamini & Hochberg 1995; tests of stones that share errors are positively dependent). An area whose interval
+    /// begins at zero is no zone. Of two that share more than half of their stones, the one that moved less is part of
+    /// the other's motion.
+    pub fn zones(&self) -> Vec<DeformationZone> {
+        let mut found = self.of_directions();
+        found.sort_by(|a, b| b.largest_m.total_cmp(&a.largest_m));
+        let mut zones: Vec<DeformationZone> = Vec::new();
+        for zone in found {
+            if !zones.iter().any(|larger| is_same(larger, &zone)) {
+                zones.push(zone);
+            }
+        }
+        zones
+    }
+
+    /// A zone for each area of each direction.
+    fn of_directions(&self) -> Vec<DeformationZone> {
+        let count = self.body.stones.len();
+        let motion = |k: usize, i: usize| (self.frames[i] * self.rigid.deformations[i].0)[k];
+        let sd = |k: usize, i: usize| {
+            let axis = self.frames[i].row(k).transpose();
+            axis.dot(&(self.rigid.deformations[i].1 * axis)).max(0.0).sqrt()
+        };
+        let motions: [Vec<f64>; 3] = [0, 1, 2].map(|k| (0..count).map(|i| motion(k, i)).collect());
+        let sds: [Vec<f64>; 3] = [0, 1, 2].map(|k| (0..count).map(|i| sd(k, i)).collect());
+        let p = |(k, i): (usize, usize)| {
+            let square = (motions[k][i] / sds[k][i]).powi(2);
+            self.body.stones[i].is_firm.then(|| chi_square_p(square, 1))
+        };
+        let tests = (0..3).flat_map(|k| (0..count).map(move |i| (k, i)));
+        let p_values: Vec<Option<f64>> = tests.map(p).collect();
+        let mut moved = vec![false; 3 * count];
+        discoveries(&p_values, FALSE_DISCOVERY_RATE)
+            .into_iter()
+            .for_each(|test| moved[test] = true);
+
+        let mut zones = Vec::new();
+        for (k, moved) in moved.chunks(count).enumerate() {
+            for sign in [1.0, -1.0] {
+                let signed: Vec<f64> = motions[k].iter().map(|m| sign * m).collect();
+                let motion = Motion::new(&self.next, &signed, &sds[k]);
+                for area in motion.areas(moved) {
+                    let extent = Extent::new(self.body, &self.next, &motion, &area);
+                    let kind = match k {
+                        OUT => shape(self.body, &area, &motion, [&signed, &sds[k]], &extent),
+                        _ => in_face(k, sign),
+                    };
+                    zones.extend(self.zone(&area, k, kind, extent.sides_m()));
+                }
+            }
+        }
+        zones
+    }
+
+    /// The zone of an area in direction `k`; `None` if its interval begins at zero. Stones of which this direction is
+    /// the largest count with their whole deformation, others with what they moved in it. The interval holds the largest
+    /// of them all, not only that of the stone at which the measured one is largest (Bonferroni over the stones).
+    fn zone(&self, area: &Area, k: usize, kind: ZoneKind, sides_m: [f64; 2]) -> Option<DeformationZone> {
+        let quantile = Normal::standard().inverse_cdf(1.0 - 0.5 * OUTSIDE / area.stones.len() as f64);
+        let (mut largest_m, mut low_m, mut high_m): (f64, f64, f64) = (0.0, 0.0, 0.0);
+        let mut mean_m = Vector3::zeros();
+        for &i in &area.stones {
+            let (deformation, covariance) = &self.rigid.deformations[i];
+            let in_wall = self.frames[i] * deformation;
+            let axis = match in_wall.iamax() == k {
+                true => deformation.try_normalize(0.0).unwrap_or_else(Vector3::x),
+                false => self.frames[i].row(k).transpose(),
+            };
+            let length_m = axis.dot(deformation).abs();
+            let half_m = quantile * axis.dot(&(covariance * axis)).max(0.0).sqrt();
+            largest_m = largest_m.max(length_m);
+            low_m = low_m.max(length_m - half_m);
+            high_m = high_m.max(length_m + half_m);
+            mean_m += in_wall / area.stones.len() as f64;
+        }
+        let size = Size {
+            sides_m,
+            largest_m,
+            interval_m: [low_m, high_m],
+        };
+        (low_m > 0.0).then(|| self.described(&area.stones, kind, mean_m, size))
+    }
+
+    /// The zone of the most likely bulge, where no stones show one, as the field smooths weak motions; with the amplitude
+    /// that their own observations give it. The interval holds with 95 % although the bulge was chosen from all places,
+    /// sizes and directions.
+    pub fn bulge(&self, scan: &Scan) -> DeformationZone {
+        let found = &scan.most_likely;
+        let largest = found.stones.iter().map(|s| s.1).fold(0.0, f64::max);
+        let half = || found.stones.iter().filter(|s| s.1 >= HALF * largest);
+        let moved = |&(i, share): &(usize, f64)| {
+            let world_from_face = self.body.stones[i].joint.face_from_world.transpose();
+            self.frames[i] * world_from_face * Vector3::ith(found.direction, found.amplitude_m * share)
+        };
+        let mean_m = half().map(moved).sum::<Vector3<f64>>() / half().count() as f64;
+        let (largest_m, half_m) = (
+            largest * found.amplitude_m.abs(),
+            scan.reach * largest * found.amplitude_sd_m,
+        );
+        let stones: Vec<usize> = half().map(|s| s.0).collect();
+        let size = Size {
+            // A cos^2 is half as large half of the way to its edge.
+            sides_m: [HALF * found.diameter_m; 2],
+            largest_m,
+            interval_m: [(largest_m - half_m).max(0.0), largest_m + half_m],
+        };
+        let kind = match mean_m.iamax() {
+            OUT => ZoneKind::Bulge,
+            k => in_face(k, mean_m[k]),
+        };
+        self.described(&stones, kind, mean_m, size)
+    }
+
+    fn described(
+        &self,
+        stones: &[usize],
+        kind: ZoneKind,
+        mean_m: Vector3<f64>,
+        size: Size,
+    ) -> DeformationZone {
+        let mut ids: Vec<_> = stones.iter().map(|&i| self.body.stones[i].id).collect();
+        ids.sort_unstable();
+        let [length_m, width_m] = size.sides_m;
+        let is_round = length_m - width_m < self.body.step_m();
+        DeformationZone {
+            number: 0,
+            stones: ids,
+            diameter_m: is_round.then_some((length_m * width_m).sqrt()),
+            length_m,
+            width_m,
+            largest_m: size.largest_m,
+            interval_m: size.interval_m,
+            mean_m,
+            kind,
+            against: self.against,
+        }
     }
 }
 
-/// The zone of the most likely bulge. Its interval holds with 95 % although the bulge was chosen from all places, sizes
-/// and directions.
-fn bulge(body: &Body, scan: &Scan) -> DeformationZone {
-    let found = &scan.most_likely;
-    let moved = |(_, share): &(usize, f64)| Vector3::ith(found.direction, found.amplitude_m * share);
-    let in_face: Vec<Vector3<f64>> = found.stones.iter().map(moved).collect();
-    let largest = found.stones.iter().map(|s| s.1).fold(0.0, f64::max);
-    let (largest_m, half_m) = (
-        largest * found.amplitude_m.abs(),
-        scan.reach * largest * found.amplitude_sd_m,
-    );
-    let interval_m = [(largest_m - half_m).max(0.0), largest_m + half_m];
-    let stones: Vec<usize> = found.stones.iter().map(|s| s.0).collect();
-    described(body, &stones, &in_face, largest_m, interval_m)
+/// Whether two zones share more than half of the stones of both.
+fn is_same(a: &DeformationZone, b: &DeformationZone) -> bool {
+    let of_a: BTreeSet<_> = a.stones.iter().collect();
+    let shared = b.stones.iter().filter(|id| of_a.contains(id)).count();
+    shared as f64 > HALF * (a.stones.len() + b.stones.len() - shared) as f64
 }
 
-/// The zone of these stones. Its interval holds the largest deformation of them all, not only that of the stone at which
-/// the measured one is largest (Bonferroni over the stones).
-fn zone(body: &Body, rigid: &RigidPart, stones: &[usize]) -> DeformationZone {
-    let quantile = Normal::standard().inverse_cdf(1.0 - 0.5 * OUTSIDE / stones.len() as f64);
-    let (mut largest_m, mut low_m, mut high_m): (f64, f64, f64) = (0.0, 0.0, 0.0);
-    for &i in stones {
-        let (deformation, covariance) = &rigid.deformations[i];
-        let length_m = deformation.norm();
-        let direction = deformation.try_normalize(0.0).unwrap_or_else(Vector3::x);
-        let half_m = quantile * direction.dot(&(covariance * direction)).max(0.0).sqrt();
-        largest_m = largest_m.max(length_m);
-        low_m = low_m.max(length_m - half_m);
-        high_m = high_m.max(length_m + half_m);
-    }
-    let motion = |&i: &usize| body.stones[i].joint.face_from_world * rigid.deformations[i].0;
-    let in_face: Vec<Vector3<f64>> = stones.iter().map(motion).collect();
-    described(body, stones, &in_face, largest_m, [low_m, high_m])
-}
-
-/// `in_face`: the motion of each stone along, up and out; `interval_m`: of the largest, 95 %.
-fn described(
-    body: &Body,
-    stones: &[usize],
-    in_face: &[Vector3<f64>],
+/// How large a zone is and how far it moved, metres.
+struct Size {
+    /// Length and width.
+    sides_m: [f64; 2],
     largest_m: f64,
+    /// Of the largest, 95 %.
     interval_m: [f64; 2],
-) -> DeformationZone {
-    let in_face = &in_wall(body, stones, in_face);
-    let mean_m = in_face.iter().sum::<Vector3<f64>>() / stones.len() as f64;
-    let mut ids: Vec<_> = stones.iter().map(|&i| body.stones[i].id).collect();
-    ids.sort_unstable();
-    DeformationZone {
-        number: 0,
-        stones: ids,
-        largest_m,
-        interval_m,
-        mean_m,
-        kind: kind(body, stones, in_face, &mean_m),
-    }
 }
 
-/// The motions (along, up, out) with those of level faces along, up and out of the upright wall around them: what moves
-/// out of a level face rises.
-fn in_wall(body: &Body, stones: &[usize], in_face: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-    let frame = |i: usize| body.stones[i].joint.face_from_world;
-    let out = |i: usize| frame(i).row(2).transpose();
-    let is_level = |i: usize| out(i).z.abs() > LEVEL;
-    let upright = |stones: &mut dyn Iterator<Item = usize>| {
-        let sum: Vector3<f64> = stones.filter(|&i| !is_level(i)).map(out).sum();
-        Vector3::new(sum.x, sum.y, 0.0).try_normalize(0.0)
-    };
-    let wall = upright(&mut stones.iter().copied()).or_else(|| upright(&mut (0..body.stones.len())));
-    let of_stone = |(&i, motion): (&usize, &Vector3<f64>)| match &wall {
-        Some(out) if is_level(i) => {
-            FaceFrame::from_normal(out).face_from_world() * frame(i).transpose() * motion
-        }
-        _ => *motion,
-    };
-    stones.iter().zip(in_face).map(of_stone).collect()
-}
-
-/// What the motions of a zone (along, up, out) resemble: by the component that is largest in the quadratic mean and its
-/// sign, and across the wall by whether they grow towards one side.
-fn kind(body: &Body, stones: &[usize], in_face: &[Vector3<f64>], mean: &Vector3<f64>) -> ZoneKind {
-    let squares: Vector3<f64> = in_face.iter().map(|d| d.component_mul(d)).sum();
-    let largest = squares.imax();
-    let mean_size = in_face.iter().map(|d| d[largest].abs()).sum::<f64>() / stones.len() as f64;
-    let is_one_way = mean[largest].abs() >= ONE_WAY * mean_size;
-    match largest {
-        2 if is_tilt(body, stones, in_face) => ZoneKind::Tilt,
-        _ if !is_one_way => ZoneKind::Distortion,
-        0 => ZoneKind::Slide,
-        1 if mean.y < 0.0 => ZoneKind::Settlement,
-        1 => ZoneKind::Heave,
-        _ if mean.z > 0.0 => ZoneKind::Bulge,
-        _ => ZoneKind::Dent,
+/// The kind of what moved in direction `k` in the face.
+fn in_face(k: usize, moved: f64) -> ZoneKind {
+    match k == UP && moved < 0.0 {
+        true => ZoneKind::Settlement,
+        false => ZoneKind::Other,
     }
-}
-
-/// Whether a plane explains how far stones moved out.
-fn is_tilt(body: &Body, stones: &[usize], in_face: &[Vector3<f64>]) -> bool {
-    if stones.len() < TILT_STONES {
-        return false;
-    }
-    let middle = stones
-        .iter()
-        .map(|&i| body.stones[i].joint.place.coords)
-        .sum::<Vector3<f64>>()
-        / stones.len() as f64;
-    let frame = body.stones[stones[0]].joint.face_from_world;
-    let (mut normal, mut right, mut whole) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
-    let mean = in_face.iter().map(|d| d.z).sum::<f64>() / stones.len() as f64;
-    for (&i, d) in stones.iter().zip(in_face) {
-        let place = frame * (body.stones[i].joint.place.coords - middle);
-        let row = Vector3::new(1.0, place.x, place.y);
-        normal += row * row.transpose();
-        right += row * (d.z - mean);
-        whole += (d.z - mean).powi(2);
-    }
-    let Some(factor) = normal.cholesky() else {
-        return false;
-    };
-    let count = stones.len() as f64;
-    // Per degree of freedom: a plane goes through any three stones.
-    let rest = (whole - right.dot(&factor.solve(&right))) / (count - 3.0);
-    let varies = whole > count * (UNEVEN * mean).powi(2);
-    varies && rest < (1.0 - TILTED) * whole / (count - 1.0)
 }
