@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use stonewise::Settings;
-use stonewise::results::{Reference, StoneRow, stone_table};
+use stonewise::results::{Reference, StoneRow, Term, stone_table};
 use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::geometry::{Camera, Plane, View, cell_of, cells_around};
 use stonewise_core::id::{ImageId, StoneId};

@@ -414,8 +414,9 @@ pub struct DeformedZone {
     pub up_m: f64,
     /// Diameter, metres; null unless it is round.
     pub diameter_m: Option<f64>,
-    /// Length and width, metres.
+    /// Longer extent of the part, metres.
     pub length_m: f64,
+    /// Shorter extent of the part, metres.
     pub width_m: f64,
     /// Area of the faces of its stones.
     pub area_m2: f64,
