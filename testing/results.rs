@@ -7,8 +7,8 @@ use stonewise_core::registration::VarianceComponents;
 use stonewise_core::registration::observers::SensorClass;
 use stonewise_results::StoneOutline;
 use stonewise_results::records::{
-    AdjustmentRecord, Datum, DatumState, EpochRecord, EstimatorRecord, InputRecord, ObserversRecord,
-    ProjectRecord, RegistrationRecord, RunRecord,
+    AdjustmentRecord, CheckRecord, Datum, DatumState, EpochRecord, EstimatorRecord, InputRecord,
+    ObserversRecord, ProjectRecord, RegistrationRecord, RunRecord,
 };
 use stonewise_results::{Budget, RowMotion, Status, StoneRow, write_outlines, write_stones};
 
@@ -115,6 +115,14 @@ pub fn registration_record() -> RegistrationRecord {
         ),
         observers: Some(observers),
         deformation: None,
+        checks: vec![CheckRecord {
+            name: "insensitive".to_owned(),
+            statistic: 1.25,
+            limit: 100.0,
+            source: "what the points allow".to_owned(),
+            remedy: "look at the masks".to_owned(),
+            passed: true,
+        }],
     }
 }
 

@@ -15,8 +15,8 @@ pub use instruments::{
     LeftOutInstrument, WhyLeftOut,
 };
 pub use registration::{
-    AdjustmentRecord, DeformationRecord, EstimatorRecord, GicpRecord, ObserversRecord, PhotosRecord,
-    RegistrationRecord,
+    AdjustmentRecord, CheckRecord, DeformationRecord, EstimatorRecord, GicpRecord, ObserversRecord,
+    PhotosRecord, RegistrationRecord,
 };
 pub use remarks::{Remark, Remarks, Signature, signed_digest};
 pub use run::{CrsRecord, EpochRecord, InputRecord, PhotoScale, ProjectRecord, RunRecord, StepTime};
@@ -64,6 +64,7 @@ mod tests {
             datum: Datum::unknown(&nalgebra::Point3::new(1.0, 2.0, 3.0), "unknown".to_owned()),
             observers: None,
             deformation: None,
+            checks: Vec::new(),
         });
         let params = EvaluationParams::default();
         let mut evaluation = Evaluation::new("the motion in the project file", &params);

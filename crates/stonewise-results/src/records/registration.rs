@@ -24,6 +24,26 @@ pub struct RegistrationRecord {
     /// Whether and where the wall deformed; absent if the estimator gives no joint distribution of the motions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deformation: Option<DeformationRecord>,
+    /// Checks of the run, also those that passed.
+    #[serde(default)]
+    pub checks: Vec<CheckRecord>,
+}
+
+/// A check of the results: its statistic lies on the right side of its limit where it passed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CheckRecord {
+    /// Name under which `stonewise explain` says more of it.
+    pub name: String,
+    /// What was found.
+    pub statistic: f64,
+    /// What it is compared with.
+    pub limit: f64,
+    /// Where the limit is from.
+    pub source: String,
+    /// What to do where it fails.
+    pub remedy: String,
+    /// Whether it passed.
+    pub passed: bool,
 }
 
 /// Whether and where the wall deformed.

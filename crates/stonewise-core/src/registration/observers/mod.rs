@@ -56,6 +56,6 @@ pub use joint::JointErrors;
 pub use lone_area::LoneArea;
 pub use network::{NetworkShift, PhotoNetwork};
 pub use response::Response;
-pub use scale::{KnownScale, ScaleError};
+pub use scale::{KnownScale, ScaleError, WallStrain};
 pub use sight::{SeenStone, Source, SourcePoints};
 pub use stable::{StableParams, StablePoints};

@@ -37,9 +37,22 @@ pub struct ScaleError {
     pub mean: f64,
     /// Its standard deviation.
     pub sd: f64,
-    /// Mean strain of the wall and its 95 % half width, and the lesser principal strain, where they are beyond what
-    /// instruments and temperature explain.
-    pub strain: Option<[f64; 3]>,
+    /// How the wall changed its size; `None` where too few stones show it.
+    pub strain: Option<WallStrain>,
+}
+
+/// How a wall grew or shrank all round.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WallStrain {
+    /// Mean strain.
+    pub mean: f64,
+    /// Half width of its 95 % interval.
+    pub half_width: f64,
+    /// The lesser principal strain.
+    pub lesser: f64,
+    /// The least strain all round that the motions leave possible, by the largest that instruments and temperature
+    /// explain: beyond one, a wrong scale.
+    pub excess: f64,
 }
 
 impl ScaleError {
@@ -51,7 +64,9 @@ impl ScaleError {
         Self {
             centre,
             mean: known.mean,
-            sd: strain.map_or(known.sd, |[mean, _, _]| known.sd.hypot(mean)),
+            sd: strain
+                .filter(|s| s.excess > 1.0)
+                .map_or(known.sd, |s| known.sd.hypot(s.mean)),
             strain,
         }
     }
@@ -73,9 +88,8 @@ impl ScaleError {
     }
 }
 
-/// The strain of the stones that are not loose, if the wall grew or shrank all round by more than the scale and
-/// temperature explain.
-fn strain(known: &KnownScale, response: Option<&Response>) -> Option<[f64; 3]> {
+/// The strain of the stones that are not loose.
+fn strain(known: &KnownScale, response: Option<&Response>) -> Option<WallStrain> {
     let stones = response?.motions.stones.iter().flatten();
     let (places, displacements): (Vec<_>, Vec<_>) = stones
         .filter(|s| !s.is_loose)
@@ -85,5 +99,10 @@ fn strain(known: &KnownScale, response: Option<&Response>) -> Option<[f64; 3]> {
     let sign = strain.mean.signum();
     let least = sign * strain.lesser - STRAIN_SIGMAS_95 * strain.lesser_sd;
     let half_width = STRAIN_SIGMAS_95 * strain.mean_sd;
-    (least > THERMAL_STRAIN + STRAIN_SIGMAS_95 * known.sd).then_some([strain.mean, half_width, strain.lesser])
+    Some(WallStrain {
+        mean: strain.mean,
+        half_width,
+        lesser: strain.lesser,
+        excess: least / (THERMAL_STRAIN + STRAIN_SIGMAS_95 * known.sd),
+    })
 }

@@ -1,5 +1,6 @@
 //! Doubts about the results of a pair of epochs as a whole.
 
+mod check;
 mod fit;
 mod labels;
 mod motions;
@@ -15,8 +16,9 @@ use crate::pipeline::steps::measure::MEASURE;
 use crate::pipeline::steps::offsets::OFFSETS;
 use crate::pipeline::steps::register::{Registered, note_registration};
 use crate::pipeline::until::Until;
+use crate::results::records::CheckRecord;
 use crate::settings::Align;
-use crate::texts::Said;
+use check::Check;
 use fit::Fit;
 use labels::{Votes, beside};
 use motions::{blind, few_measured, refused, uncovered, unsettled};
@@ -37,8 +39,7 @@ pub static DOUBTS: Step = Step {
 fn note_doubts(run: &Run, later: EpochId) -> Result<()> {
     let (context, labelled) = (run.context, run.labelled_pair(later)?);
     let (registered, measured) = (run.registered(later)?, run.measured(later)?);
-    let (datum, rows) = (&measured.datum, &measured.rows);
-    note_registration(context, later, &registered, datum);
+    note_registration(context, later, &registered, &measured.datum);
     let epochs = context.project.epochs.pair(later);
     let fit = Fit::of(&registered);
     // The first epoch takes part in every pair.
@@ -59,6 +60,21 @@ fn note_doubts(run: &Run, later: EpochId) -> Result<()> {
     for (name, message) in beside(context, later, &*run.offsets(later)?) {
         context.warnings.doubt("label", name, message);
     }
+    for doubt in checks(run, later)?.into_iter().filter_map(|check| check.doubt) {
+        context.warnings.doubt("register", &epochs.later.name, doubt);
+    }
+    Ok(())
+}
+
+/// The checks of a later epoch, as registration.json has them.
+pub fn check_records(run: &Run, later: EpochId) -> Result<Vec<CheckRecord>> {
+    Ok(checks(run, later)?.iter().map(Check::record).collect())
+}
+
+fn checks(run: &Run, later: EpochId) -> Result<Vec<Check>> {
+    let context = run.context;
+    let (registered, measured) = (run.registered(later)?, run.measured(later)?);
+    let (rows, fit) = (&measured.rows, Fit::of(&registered));
     let of_motions = [
         unsettled(&registered, fit),
         few_measured(rows, fit),
@@ -74,15 +90,12 @@ fn note_doubts(run: &Run, later: EpochId) -> Result<()> {
         true => [None, None],
         false => [misregistered(context, &registered), stretched(&registered)],
     };
-    for message in of_motions.into_iter().chain(of_epochs).flatten() {
-        context.warnings.doubt("register", &epochs.later.name, message);
-    }
-    Ok(())
+    Ok(of_motions.into_iter().chain(of_epochs).flatten().collect())
 }
 
 /// See [`registration::misregistered`]. Where the stones aligned the epochs, nothing is claimed that surfaces off
 /// the wall could contradict.
-fn misregistered(context: &Context, registered: &Registered) -> Option<Said> {
+fn misregistered(context: &Context, registered: &Registered) -> Option<Check> {
     let params = &context.project.settings.registration;
     let check = registered.epoch_errors.as_ref()?.cross_check.as_ref()?;
     let check = Some(check).filter(|_| params.align == Align::None)?;

@@ -1,5 +1,6 @@
 //! Doubts about the motions of a pair of epochs.
 
+use super::check::{Check, Rule};
 use super::fit::Fit;
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
@@ -21,21 +22,54 @@ const PART_STONES: usize = 10;
 /// Half width of a 95 % interval, in standard deviations.
 const SIGMAS_95: f64 = 1.96;
 
+/// Largest share of the stones that may still move; see the adjustment's end.
+static SETTLED: Rule = Rule {
+    message: &NOT_CONVERGED,
+    limit: 0.0,
+    source: "the adjustment ends when nine tenths of the stones have settled, or after `max_iterations`",
+    remedy: "look at masks and cameras of both epochs, or raise `max_iterations`",
+};
+static MEASURED: Rule = Rule {
+    message: &FEW_MEASURED,
+    limit: 0.5,
+    source: "half of the stones that were found in both epochs",
+    remedy: "look at the status of the stones: clouds, masks or cameras of the epochs do not fit each other",
+};
+static COVERED: Rule = Rule {
+    message: &UNCOVERED,
+    limit: LEAST_COVERED,
+    source: "a tenth of the walls around the measured stones",
+    remedy: "give photos, denser clouds, or `[views] outside` if the wall is seen from behind",
+};
+static CONFIRMED: Rule = Rule {
+    message: &PART_REFUSED,
+    limit: PART_STONES as f64,
+    source: "more neighbouring stones than mistakes of single masks explain",
+    remedy: "look at the part on site and in the clouds of both epochs",
+};
+static SENSITIVE: Rule = Rule {
+    message: &BLIND,
+    limit: LIMIT_EXCESS,
+    source: "hundred times what spacing and noise of the points allow",
+    remedy: "look at masks, cameras and overlap of the epochs",
+};
+
 /// The adjustment stopped before its motions had settled.
-pub(super) fn unsettled(registered: &Registered, fit: Fit) -> Option<Said> {
+pub(super) fn unsettled(registered: &Registered, fit: Fit) -> Option<Check> {
     let EstimatorRecord::Adjustment(adjustment) = &registered.estimator else {
         return None;
     };
     let iterations = adjustment.iterations.to_string();
-    (!adjustment.converged)
-        .then(|| NOT_CONVERGED.say(&[("iterations", iterations.into()), ("cause", fit.cause())]))
+    let doubt = (!adjustment.converged)
+        .then(|| NOT_CONVERGED.say(&[("iterations", iterations.into()), ("cause", fit.cause())]));
+    Some(SETTLED.check(f64::from(u8::from(!adjustment.converged)), doubt))
 }
 
 /// Most of the stones that were found in both epochs could not be measured.
-pub(super) fn few_measured(rows: &[StoneRow], fit: Fit) -> Option<Said> {
+pub(super) fn few_measured(rows: &[StoneRow], fit: Fit) -> Option<Check> {
     let matched = rows.iter().filter(|r| r.matched_id.is_some()).count();
     let measured = rows.iter().filter(|r| r.status == Status::Ok).count();
-    (2 * measured < matched).then(|| {
+    let doubt = (2 * measured < matched).then(|| {
         let counts = Status::ALL.iter().filter_map(|status| {
             let n = rows
                 .iter()
@@ -50,22 +84,24 @@ pub(super) fn few_measured(rows: &[StoneRow], fit: Fit) -> Option<Said> {
             ("cause", fit.cause()),
         ];
         FEW_MEASURED.say(&values)
-    })
+    });
+    (matched > 0).then(|| MEASURED.check(measured as f64 / matched as f64, doubt))
 }
 
 /// The measured stones cover little of the walls that the clouds show around them; `walls_m2`: area of all walls. Farther
 /// away there may be rock or other buildings.
-pub(super) fn uncovered(rows: &[StoneRow], walls_m2: f64) -> Option<Said> {
+pub(super) fn uncovered(rows: &[StoneRow], walls_m2: f64) -> Option<Check> {
     let measured: Vec<&StoneRow> = rows.iter().filter(|r| r.status == Status::Ok).collect();
     let area_m2: f64 = measured.iter().map(|r| r.area_m2).sum();
     let walls_m2 = walls_m2.min(around_m2(&measured));
-    (area_m2 < LEAST_COVERED * walls_m2).then(|| {
+    let doubt = (area_m2 < LEAST_COVERED * walls_m2).then(|| {
         UNCOVERED.say(&[
             ("measured", measured.len().to_string().into()),
             ("area", Said::numbers(format!("{area_m2:.1}"))),
             ("walls", Said::numbers(format!("{walls_m2:.1}"))),
         ])
-    })
+    });
+    (walls_m2 > 0.0).then(|| COVERED.check(area_m2 / walls_m2, doubt))
 }
 
 /// Area of the face around stones.
@@ -82,23 +118,24 @@ fn around_m2(stones: &[&StoneRow]) -> f64 {
 }
 
 /// A part of the wall that is too large to be a mistake of some masks has no motion because nothing confirms it.
-pub(super) fn refused(rows: &[StoneRow]) -> Option<Said> {
+pub(super) fn refused(rows: &[StoneRow]) -> Option<Check> {
     let mut parts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for row in rows.iter().filter(|r| r.status == Status::FailedDisagreement) {
         if let Some(body) = row.body_id.filter(|body| *body > 1) {
             parts.entry(body).or_default().push(row.stone_id);
         }
     }
-    let largest = parts.into_values().max_by_key(Vec::len)?;
-    (largest.len() >= PART_STONES).then(|| {
+    let largest = parts.into_values().max_by_key(Vec::len).unwrap_or_default();
+    let doubt = (largest.len() >= PART_STONES).then(|| {
         let values = [largest.len(), largest[0] as usize].map(|n| n.to_string().into());
         let [stones, stone] = values;
         PART_REFUSED.say(&[("stones", stones), ("stone", stone)])
-    })
+    });
+    Some(CONFIRMED.check(largest.len() as f64, doubt))
 }
 
 /// Motions are far less certain than the points allow.
-pub(super) fn blind(registered: &Registered, rows: &[StoneRow], fit: Fit) -> Option<Said> {
+pub(super) fn blind(registered: &Registered, rows: &[StoneRow], fit: Fit) -> Option<Check> {
     let points: BTreeMap<u32, [f64; 2]> = rows
         .iter()
         .filter_map(|r| Some((r.stone_id, [f64::from(r.points_1), f64::from(r.points_2?)])))
@@ -115,7 +152,7 @@ pub(super) fn blind(registered: &Registered, rows: &[StoneRow], fit: Fit) -> Opt
     let mut all: Vec<(f64, f64)> = measured.filter_map(ratio).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let &(excess, sd) = all.get(all.len() / 2)?;
-    (excess > LIMIT_EXCESS).then(|| {
+    let doubt = (excess > LIMIT_EXCESS).then(|| {
         let limit = format!("{:.0}", 1e3 * SIGMAS_95 * sd);
         let excess = format!("{excess:.0}");
         BLIND.say(&[
@@ -123,11 +160,13 @@ pub(super) fn blind(registered: &Registered, rows: &[StoneRow], fit: Fit) -> Opt
             ("excess", excess.into()),
             ("cause", fit.cause()),
         ])
-    })
+    });
+    Some(SENSITIVE.check(excess, doubt))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::check::said;
     use super::*;
     use crate::testing::{registration_record, rows};
     use nalgebra::{Matrix3, Matrix6, Vector3};
@@ -175,7 +214,7 @@ mod tests {
     #[test]
     fn an_adjustment_that_did_not_converge_is_a_doubt() {
         let mut registered = registered(&rows(), 0.001, 0.001);
-        let message = unsettled(&registered, Fit::default()).unwrap();
+        let message = said(unsettled(&registered, Fit::default())).unwrap();
         assert!(
             message.english.contains("did not converge in 32 iterations"),
             "{message}"
@@ -183,23 +222,23 @@ mod tests {
         if let EstimatorRecord::Adjustment(adjustment) = &mut registered.estimator {
             adjustment.converged = true;
         }
-        assert_eq!(unsettled(&registered, Fit::default()), None);
+        assert_eq!(said(unsettled(&registered, Fit::default())), None);
     }
 
     #[test]
     fn less_than_half_of_the_matched_stones_measured_is_a_doubt() {
         // 22 of 24 stones are matched and 20 measured.
         let mut rows = rows();
-        assert_eq!(few_measured(&rows, Fit::default()), None);
+        assert_eq!(said(few_measured(&rows, Fit::default())), None);
         let measured = rows.iter_mut().filter(|r| r.status == Status::Ok);
         measured
             .take(9)
             .for_each(|r| r.status = Status::FailedConvergence);
         // 11 of 22 are half.
-        assert_eq!(few_measured(&rows, Fit::default()), None);
+        assert_eq!(said(few_measured(&rows, Fit::default())), None);
         let mut measured = rows.iter_mut().filter(|r| r.status == Status::Ok);
         measured.next().unwrap().status = Status::FailedDisagreement;
-        let message = few_measured(&rows, Fit::default()).unwrap();
+        let message = said(few_measured(&rows, Fit::default())).unwrap();
         for part in [
             "only 10 of the 22 stones",
             "1 failed_points",
@@ -224,14 +263,14 @@ mod tests {
             };
             rows().into_iter().map(place).collect()
         };
-        assert_eq!(uncovered(&with_area(1.01), 10.0), None);
-        let message = uncovered(&with_area(0.99), 10.0).unwrap();
+        assert_eq!(said(uncovered(&with_area(1.01), 10.0)), None);
+        let message = said(uncovered(&with_area(0.99), 10.0)).unwrap();
         for part in ["the 20 measured stones", "1.0 m2 of the 10.0 m2"] {
             assert!(message.english.contains(part), "{part}: {message}");
         }
         // Of the walls of a valley, those around the stones count.
-        assert_eq!(uncovered(&with_area(1.23), 1000.0), None);
-        assert!(uncovered(&with_area(1.22), 1000.0).is_some());
+        assert_eq!(said(uncovered(&with_area(1.23), 1000.0)), None);
+        assert!(said(uncovered(&with_area(1.22), 1000.0)).is_some());
     }
 
     #[test]
@@ -241,14 +280,14 @@ mod tests {
             row.status = Status::FailedDisagreement;
             row.body_id = Some(2);
         }
-        let message = refused(&rows).unwrap();
+        let message = said(refused(&rows)).unwrap();
         let first = rows[0].stone_id;
         let part = format!("10 neighbouring stones of a part of the wall, around stone {first},");
         assert!(message.english.contains(&part), "{message}");
         // Scans alone have no photos that could contradict it.
         assert!(!message.english.contains("photo"), "{message}");
         rows[0].status = Status::Ok;
-        assert_eq!(refused(&rows), None);
+        assert_eq!(said(refused(&rows)), None);
     }
 
     #[test]
@@ -256,16 +295,22 @@ mod tests {
         // About 2,000 and 1,900 points with residuals of 1 mm allow 0.032 mm.
         let rows = rows();
         assert_eq!(
-            blind(&registered(&rows, 0.0031, 0.001), &rows, Fit::default()),
+            said(blind(&registered(&rows, 0.0031, 0.001), &rows, Fit::default())),
             None
         );
-        let message = blind(&registered(&rows, 0.0033, 0.001), &rows, Fit::default()).unwrap();
+        let message = said(blind(&registered(&rows, 0.0033, 0.001), &rows, Fit::default())).unwrap();
         assert!(
             message.english.contains("below about 6 mm") && message.english.contains("103 times"),
             "{message}"
         );
         // A wall without measured stones, and stones whose residuals are zero, show no limit.
-        assert_eq!(blind(&registered(&[], 1.0, 0.001), &rows, Fit::default()), None);
-        assert_eq!(blind(&registered(&rows, 1.0, 0.0), &rows, Fit::default()), None);
+        assert_eq!(
+            said(blind(&registered(&[], 1.0, 0.001), &rows, Fit::default())),
+            None
+        );
+        assert_eq!(
+            said(blind(&registered(&rows, 1.0, 0.0), &rows, Fit::default())),
+            None
+        );
     }
 }

@@ -1,5 +1,6 @@
 //! Doubts about the registration of an epoch.
 
+use super::check::{Check, Rule};
 use crate::texts::{MISREGISTERED_EPOCH, Said};
 use nalgebra::Vector3;
 use stonewise_core::registration::observers::CrossCheck;
@@ -8,10 +9,17 @@ use stonewise_core::registration::observers::CrossCheck;
 /// below which the run is in doubt: one sound survey in a thousand.
 const MISREGISTERED: f64 = 1e-3;
 
+static AGREES: Rule = Rule {
+    message: &MISREGISTERED_EPOCH,
+    limit: MISREGISTERED,
+    source: "probability of the difference: one sound survey in a thousand",
+    remedy: "use the surfaces off the wall (`auto_stable`, `[[registration.stable]]`), or state `epoch_error_m`",
+};
+
 /// Surfaces off the wall show a registration error that differs significantly from the one found without
 /// them. An error that the project states is not questioned.
-pub(super) fn misregistered(stated_m: Option<f64>, check: &CrossCheck) -> Option<Said> {
-    if stated_m.is_some() || check.p >= MISREGISTERED {
+pub(super) fn misregistered(stated_m: Option<f64>, check: &CrossCheck) -> Option<Check> {
+    if stated_m.is_some() {
         return None;
     }
     let mm = |v: &Vector3<f64>| Said::list(&[v.x, v.y, v.z].map(|m| format!("{:+.1}", 1e3 * m)));
@@ -22,11 +30,13 @@ pub(super) fn misregistered(stated_m: Option<f64>, check: &CrossCheck) -> Option
         ("found", mm(&check.found)),
         ("sd", Said::numbers(format!("{:.1}", 1e3 * sd))),
     ];
-    Some(MISREGISTERED_EPOCH.say(&values))
+    let doubt = (check.p < MISREGISTERED).then(|| MISREGISTERED_EPOCH.say(&values));
+    Some(AGREES.check(check.p, doubt))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::check::said;
     use super::*;
 
     #[test]
@@ -38,9 +48,9 @@ mod tests {
             covariance: nalgebra::Matrix3::identity() * 25e-8,
             p,
         };
-        assert_eq!(misregistered(None, &with(0.01)), None);
-        assert_eq!(misregistered(Some(0.02), &with(1e-9)), None);
-        let message = misregistered(None, &with(1e-9)).unwrap();
+        assert_eq!(said(misregistered(None, &with(0.01))), None);
+        assert_eq!(said(misregistered(Some(0.02), &with(1e-9))), None);
+        let message = said(misregistered(None, &with(1e-9))).unwrap();
         for part in ["30 pieces", "(+20.0, +0.0, -1.0) mm", "of 0.5 mm"] {
             assert!(message.english.contains(part), "{message}");
         }

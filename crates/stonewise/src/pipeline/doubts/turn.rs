@@ -1,15 +1,23 @@
 //! Doubts about epochs that are turned against each other.
 
+use super::check::{Check, Rule};
 use crate::results::{Status, StoneRow};
 use crate::texts::{Said, TURNED};
 use nalgebra::Matrix3;
 use stonewise_core::geometry::{DisplacementSample, SmallMotion};
 use stonewise_core::statistics::median;
 
+static SMALL_ROTATION: Rule = Rule {
+    message: &TURNED,
+    limit: 1.0,
+    source: "the typical standard deviation of a stone, in which the error of a motion linear in the rotation is counted",
+    remedy: "register the clouds of the epoch to those of the first, with their cameras",
+};
+
 /// The doubt that the wall as a whole turned too far for displacements to be linear in the rotation, as the adjustment
 /// and the common rigid motion take them: the term of second order, |w x (w x a)| / 2 for a rotation vector w and an
 /// arm a, exceeds the typical standard deviation of a stone.
-pub(super) fn turned(rows: &[StoneRow]) -> Option<Said> {
+pub(super) fn turned(rows: &[StoneRow]) -> Option<Check> {
     let measured = rows.iter().filter(|r| r.status == Status::Ok);
     let measured = measured.filter_map(|r| Some((r.centroid, r.motion.as_ref()?)));
     let (samples, mut sds): (Vec<DisplacementSample>, Vec<f64>) = measured
@@ -29,18 +37,20 @@ pub(super) fn turned(rows: &[StoneRow]) -> Option<Said> {
     let second_order =
         |s: &DisplacementSample| turn.cross(&turn.cross(&(s.place - common.centre))).norm() / 2.0;
     let error = samples.iter().map(second_order).fold(0.0, f64::max);
-    (error > sd).then(|| {
+    let doubt = (error > sd).then(|| {
         let values = [
             ("angle", turn.norm().to_degrees()),
             ("error", 1e3 * error),
             ("sd", 1e3 * sd),
         ];
         TURNED.say(&values.map(|(name, value)| (name, Said::numbers(format!("{value:.2}")))))
-    })
+    });
+    (sd > 0.0).then(|| SMALL_ROTATION.check(error / sd, doubt))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::check::said;
     use super::*;
     use crate::results::RowMotion;
     use nalgebra::{Point3, Rotation3, Vector3};
@@ -70,19 +80,19 @@ mod tests {
     #[test]
     fn an_epoch_that_is_turned_by_degrees_is_a_doubt() {
         // 1 - cos 2 degrees = 6.1e-4, at 1.9 m: 1.16 mm.
-        let message = turned(&wall(2.0, 1e-4)).unwrap();
+        let message = said(turned(&wall(2.0, 1e-4))).unwrap();
         assert!(
             message.english.contains("2.00 degrees") && message.english.contains("up to 1.16 mm"),
             "{message}"
         );
         // A millimetre and a half of registration error hides it.
-        assert_eq!(turned(&wall(2.0, 1.5e-3)), None);
+        assert_eq!(said(turned(&wall(2.0, 1.5e-3))), None);
     }
 
     #[test]
     fn a_wall_that_tilts_is_no_doubt() {
         // 5 mm at its ends.
-        assert_eq!(turned(&wall(0.15, 1e-4)), None);
-        assert_eq!(turned(&[]), None);
+        assert_eq!(said(turned(&wall(0.15, 1e-4))), None);
+        assert_eq!(said(turned(&[])), None);
     }
 }

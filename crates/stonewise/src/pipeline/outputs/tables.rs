@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::files::write_readable_json;
+use crate::pipeline::doubts::check_records;
 use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::outputs::evidence::write_tracked_stones;
 use crate::pipeline::steps::measure::MEASURE;
@@ -34,6 +35,7 @@ fn write_tables(run: &Run, later: EpochId) -> Result<()> {
         datum: measured.datum.clone(),
         observers: registered.epoch_errors.as_ref().map(ObserversRecord::from),
         deformation: registered.deformation.as_ref().map(DeformationRecord::from),
+        checks: check_records(run, later)?,
     };
     let name = PairFile::Registration.place(later.index());
     write_readable_json(&out.join(name), &record)?;
