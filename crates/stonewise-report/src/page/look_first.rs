@@ -234,6 +234,7 @@ mod tests {
                 zones: vec![DeformedZone {
                     zone_id: 1,
                     state: State::Attention,
+                    decided_by: None,
                     kind: ZoneKind::Bulge,
                     against: Against::RestOfWall,
                     along_m: 1.0,
