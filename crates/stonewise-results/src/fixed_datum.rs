@@ -1,10 +1,10 @@
 //! The motions of finished results with chosen stones as the datum.
 //!
-//! An S-transformation (Baarda 1973; Teunissen 1985): with d the motions, H the motions that a rigid motion of six
-//! parameters t causes, and F the chosen stones, t is estimated from the motions of F by least squares, weighted by the
-//! covariances C of single stones, and d - H t takes the place of d. What all stones share of the registration error cancels.
-//! Errors of the stones without that count as independent, so that the covariance of a stone in F becomes C - H Q H' and
-//! that of any other C + H Q H', with Q the covariance of t.
+//! An S-transformation (Baarda 1973; Teunissen 1985). Let d be the motions, H t the motions that a rigid motion of six
+//! parameters t causes, and F the chosen stones. Least squares, weighted by the covariances C of single stones,
+//! estimate t from the motions of F; d - H t takes the place of d. The registration error that all stones share
+//! cancels. All other errors of the stones count as independent, so that the covariance of a stone in F becomes
+//! C - H Q H' and that of any other C + H Q H', with Q the covariance of t.
 
 use super::ResultSet;
 use super::budget::Term;
@@ -42,11 +42,11 @@ const COLUMNS: [&str; 22] = [
     "sd_up",
     "sd_out",
 ];
-/// Stones that it takes to hold six parameters.
+/// Fewest stones that determine six parameters.
 const LEAST_STONES: usize = 3;
 
-/// The motions of all later epochs with stones, or those of a zone of `[thresholds]`, as the datum, in the columns of the
-/// stone table behind the epoch's name. `fixed`: numbers with commas between them, or the name of a zone.
+/// The motions of all later epochs with these stones as the datum: the epoch's name, then columns of the stone table.
+/// `fixed`: numbers of stones with commas between them, or the name of a zone of `[thresholds]`.
 ///
 /// # Errors
 /// There are no results, a stone or zone is not in them, or fewer than three of the stones were measured in an epoch.

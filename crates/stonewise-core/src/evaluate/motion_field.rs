@@ -124,7 +124,7 @@ impl MotionField {
         p + self.displacement_at(p)
     }
 
-    /// Where a point was that is at `moved` after the motion.
+    /// Where a point that is at `moved` after the motion was before it.
     pub fn undo(&self, moved: &Point3<f64>) -> Point3<f64> {
         (0..ROUNDS).fold(*moved, |at, _| moved - self.displacement_at(&at))
     }

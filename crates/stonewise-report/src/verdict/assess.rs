@@ -132,8 +132,8 @@ fn judge_stone(
     }
 }
 
-/// What of a measured stone is compared with the thresholds of a quantity; `None` where nothing is to be compared, and
-/// within where that is not known.
+/// What is compared with the thresholds of a quantity for a measured stone. The outer `None`: nothing is to be
+/// compared; the inner: what is to be compared is not known.
 fn compared(
     case: &Case,
     stone: &StoneCase,

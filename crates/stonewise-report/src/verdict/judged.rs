@@ -82,7 +82,7 @@ pub(crate) struct Compared {
 pub(super) enum Outcome {
     /// Below the threshold of attention as a whole.
     Below,
-    /// Nothing is known that could be compared.
+    /// What is to be compared is not known.
     NotJudged,
     /// It reaches the threshold of attention, and does not lie beyond it.
     Reaches,

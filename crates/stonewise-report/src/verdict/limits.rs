@@ -22,8 +22,8 @@ pub(super) fn of_attention(thresholds: &Thresholds, zones: &BTreeSet<Option<usiz
         .collect()
 }
 
-/// The thresholds that are compared with, such as "5 mm" or "6 mm (crest) or 20 mm (rest of the wall)"; the
-/// quantity is named where thresholds of several quantities differ, and where it is more than a length, the zones where a
+/// The thresholds that were compared with, such as "5 mm" or "6 mm (crest) or 20 mm (rest of the wall)". The quantity
+/// is named where thresholds of several quantities differ and where it is more than a length; zones are named where a
 /// quantity's thresholds differ on the wall.
 pub(super) fn in_words(thresholds: &Thresholds, compared: &[Placed], texts: &Texts) -> String {
     let mut limits: BTreeMap<(Quantity, i64), BTreeSet<Option<usize>>> = BTreeMap::new();

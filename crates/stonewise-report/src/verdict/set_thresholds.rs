@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use stonewise_base::thresholds::{Level, Quantity};
 use stonewise_results::records::{DatumState, ReasonCode, State};
 
-/// A still wall of 100 stones but for one, which truly moved so: millimetres along the wall, up and out.
+/// A still wall of 100 stones, of which one truly moved by this: millimetres along the wall, up and out.
 fn one_moved(mm: [f64; 3]) -> Case {
     let mut case = wall(0, 0.0, 11);
     let moved = Vector3::from(mm) / 1e3;

@@ -25,8 +25,8 @@ impl Course<'_> {
         self.epochs.iter().skip(1).map(|(name, _)| *name)
     }
 
-    /// What is known of time with the pair of this later epoch. The velocities and departures of a series are judged with
-    /// the newest of the later epochs that take part in its model, without a model with the last one.
+    /// What is known of time for the pair of this later epoch. The velocities and departures of a series are judged
+    /// with the newest later epoch that takes part in its model or, without a model, with the last one.
     pub(super) fn of_pair(&self, epoch: &str) -> TimeCase {
         let Some(trends) = self.trends else {
             return TimeCase::Pair(self.years());
@@ -60,9 +60,9 @@ impl Course<'_> {
         })
     }
 
-    /// The departure of the newest epoch from what the others predict, in standard deviations of the axis in which it is
-    /// largest. That is a test by itself, so that no interval lies around it; what chance explains among so many stones is
-    /// no departure.
+    /// The departure of the newest epoch from what the others predict, in standard deviations, on the axis on which it
+    /// is largest. It has no interval, because it is in standard deviations already; where chance explains it among so
+    /// many stones, it is zero.
     pub(super) fn departure(&self, stone: u32) -> Option<Compared> {
         let [value, sd]: [Vector3<f64>; 2] = self.stones.get(&stone)?.departure?;
         let is_shown = self.trends?.answers.as_predicted.stones.contains(&stone);

@@ -11,8 +11,8 @@ use stonewise_core::evaluate::MotionField;
 use stonewise_core::geometry::Bounds;
 use stonewise_core::transfer::LabelStore;
 
-/// Edge of the cells in which the places of moved stones are kept, metres: photos show a place of a stone with it if a
-/// point of the stone lies no farther away.
+/// Edge of the cells in which the places of moved stones are kept, metres. A place that photos show moves with a stone
+/// if a point of the stone lies within about this distance.
 const CELL_M: f64 = 0.03;
 
 /// An epoch's tiles, moved where the project prescribes a motion.
@@ -103,7 +103,8 @@ impl KnownMotion {
 }
 
 impl MovedStones {
-    /// The displacement of the stone nearest to a moved point, of those that have a place within a cell of it.
+    /// The displacement of the stone nearest to a moved point, among those with a place in its cell or a neighbouring
+    /// one.
     fn near(&self, moved: &Point3<f64>) -> Option<Vector3<f64>> {
         let [x, y, z] = cell(moved);
         let around = (0..27).map(|k| [x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1]);

@@ -35,7 +35,7 @@ const BAD_SHARE_LOOSE: f64 = 0.2;
 const ROOM_M: f64 = 0.04;
 /// Sum of 4^-k: what all octaves of length together leave in the mean over the wall, in variances of one.
 const OCTAVES_IN_MEAN: f64 = 4.0 / 3.0;
-/// Information that keeps rotations solvable which no point determines; far below any that counts.
+/// Information that keeps rotations solvable where no point determines them; far below any that counts.
 const RIDGE: f64 = 1e-9;
 
 /// What the last iteration says of the stones; nothing where there was none.

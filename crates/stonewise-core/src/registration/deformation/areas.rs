@@ -5,10 +5,11 @@ use super::found::OUTSIDE;
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeSet;
 
-/// Share of a peak above which stones are of its area, and between two peaks below which they are two.
+/// Share of a peak above which stones belong to its area. Two peaks are two areas if the motion between them falls
+/// below this share of the lower one.
 pub(super) const HALF: f64 = 0.5;
-/// Fewer connected stones that moved show no area: one or two that differ from their surroundings are judged as loose
-/// stones are.
+/// Fewest connected stones that moved in an area: one or two that differ from their surroundings are judged as loose
+/// stones.
 const LEAST_STONES: usize = 3;
 
 /// How far the stones of a body moved in one direction.
@@ -30,9 +31,10 @@ pub(super) struct Area {
 }
 
 impl<'a> Motion<'a> {
-    /// Each stone counts with those neighbours that moved alike within the errors, so that a wide area is smoothed and
-    /// an edge stays (bilateral filter: Tomasi & Manduchi 1998). A stone that moved more than twice as far as all of
-    /// its neighbours but one is no peak: it counts like that second one.
+    /// The motion of each stone is averaged with those of the neighbours that moved alike within the errors, so that a
+    /// wide area is smoothed and an edge stays (bilateral filter: Tomasi & Manduchi 1998). A stone that moved more than
+    /// twice as far as all of its neighbours but one is not a peak: it gets the second largest motion of its
+    /// neighbours.
     pub fn new(next: &'a [Vec<usize>], measured: &[f64], sds: &'a [f64]) -> Self {
         let mean = |(i, near): (usize, &Vec<usize>)| {
             let (mut sum, mut weights) = (measured[i], 1.0);
@@ -55,9 +57,9 @@ impl<'a> Motion<'a> {
         Self { next, sds, values }
     }
 
-    /// The areas, that of the highest peak first. Two peaks are of two areas if they meet below half of the lower one
-    /// by more than errors explain. `moved`: stones of which this direction is shown to have moved; an area has at least
-    /// three of them, connected, some of them perhaps beside it.
+    /// The areas, that of the highest peak first. Two peaks are two areas if the motion between them falls below half
+    /// of the lower one by more than errors explain. `moved`: stones that are shown to have moved in this direction; at
+    /// least three of them, connected, belong to an area, some perhaps beside it.
     pub fn areas(&self, moved: &[bool]) -> Vec<Area> {
         let mut order: Vec<usize> = (0..self.values.len())
             .filter(|&i| moved[i] && self.values[i] > 0.0)
@@ -112,9 +114,9 @@ impl<'a> Motion<'a> {
         beside.chain(&area.stones).copied().collect()
     }
 
-    /// For each stone of an area or beside it and each of its neighbours, the part of the way from the stone to half of
-    /// the distance that lies in the area, as shares of the way: the edge runs where the motion, linear between
-    /// neighbours, is half of the peak.
+    /// For each stone of an area or beside it and each of its neighbours: the part of the first half of the way to the
+    /// neighbour that lies in the area, from and to, as shares of the whole way. The edge lies where the motion, linear
+    /// between neighbours, is half of the peak.
     pub fn ways(&self, area: &Area) -> Vec<([usize; 2], [f64; 2])> {
         let inside: BTreeSet<usize> = area.stones.iter().copied().collect();
         // Share of the way from a stone inside to a neighbour outside.

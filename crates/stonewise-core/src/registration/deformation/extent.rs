@@ -4,7 +4,8 @@ use super::areas::{Area, Motion};
 use super::body::Body;
 use nalgebra::{Matrix2, Vector2};
 
-/// The ellipse that has the second moments of an area; in the face of the stone of its peak, from that stone.
+/// The ellipse that has the second moments of an area, in the plane of the face at its peak; the stone of the peak is
+/// the origin.
 pub(super) struct Extent {
     middle: Vector2<f64>,
     /// Second moments about the middle, m^2.
@@ -36,7 +37,7 @@ impl Extent {
         }
     }
 
-    /// Length and width, metres: of a disc its diameter.
+    /// Length and width, metres; for a disc both are its diameter.
     pub fn sides_m(&self) -> [f64; 2] {
         // The second moment of an ellipse is the square of a quarter of its axis.
         let axes = self
@@ -46,7 +47,7 @@ impl Extent {
         [axes.max(), axes.min()]
     }
 
-    /// Distance from the middle by that of the edge in the same direction. `None` for an area without width.
+    /// Distance from the middle divided by that of the edge in the same direction. `None` for an area without width.
     pub fn distance(&self) -> Option<impl Fn(&Vector2<f64>) -> f64> {
         let (middle, inverse) = (self.middle, self.moments.try_inverse()?);
         Some(move |place: &Vector2<f64>| {

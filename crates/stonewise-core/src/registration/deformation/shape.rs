@@ -8,12 +8,13 @@ use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeSet;
 use std::f64::consts::FRAC_PI_4;
 
-/// What the motions in an area and of the stones beside it fit best by weighted least squares: a cos^2 with its half on
-/// the ellipse of the area is a bulge, a plane a lean, a motion of all its stones alike and of none beside a step. Each
-/// coefficient costs the logarithm of the number of stones (Schwarz 1978), and there are at most as many as stones in the
-/// area. Stones beyond a crack do not count.
+/// The shape that fits the motions of the stones in an area and beside it best, by weighted least squares. A cos^2 that
+/// falls to half of its peak on the ellipse of the area is a bulge, a plane is a lean, the same motion of all its
+/// stones and none beside it is a step. Each coefficient costs the logarithm of the number of stones (BIC, Schwarz
+/// 1978); a shape with more coefficients than the area has stones is not tried. Stones beyond a crack do not count.
 ///
-/// `motion`: in which the area was found; `measured`, `sds`: motion of each stone and its standard deviation, metres.
+/// `motion`: that in which the area was found; `measured`, `sds`: motion of each stone and its standard deviation,
+/// metres.
 pub(super) fn shape(
     body: &Body,
     area: &Area,

@@ -105,9 +105,9 @@ impl<'a> Wall<'a> {
         zones
     }
 
-    /// The zone of an area in direction `k`; `None` if its interval begins at zero. Stones of which this direction is
-    /// the largest count with their whole deformation, others with what they moved in it. The interval holds the largest
-    /// of them all, not only that of the stone at which the measured one is largest (Bonferroni over the stones).
+    /// The zone of an area in direction `k`; `None` if its interval begins at zero. A stone that moved most in this
+    /// direction counts with its whole deformation, any other with its component in it. The interval holds the largest
+    /// deformation of all stones, not only of the stone with the largest measured one (Bonferroni over the stones).
     fn zone(&self, area: &Area, k: usize, kind: ZoneKind, sides_m: [f64; 2]) -> Option<DeformationZone> {
         let quantile = Normal::standard().inverse_cdf(1.0 - 0.5 * OUTSIDE / area.stones.len() as f64);
         let (mut largest_m, mut low_m, mut high_m): (f64, f64, f64) = (0.0, 0.0, 0.0);
@@ -134,9 +134,9 @@ impl<'a> Wall<'a> {
         (low_m > 0.0).then(|| self.described(&area.stones, kind, mean_m, size))
     }
 
-    /// The zone of the most likely bulge, where no stones show one, as the field smooths weak motions; with the amplitude
-    /// that their own observations give it. The interval holds with 95 % although the bulge was chosen from all places,
-    /// sizes and directions.
+    /// The zone of the most likely bulge, for where stones show no zone because the field smooths weak motions. Its
+    /// amplitude is that of the stones' own observations. The interval holds with 95 % although the bulge was chosen
+    /// from all places, sizes and directions.
     pub fn bulge(&self, scan: &Scan) -> DeformationZone {
         let found = &scan.most_likely;
         let largest = found.stones.iter().map(|s| s.1).fold(0.0, f64::max);

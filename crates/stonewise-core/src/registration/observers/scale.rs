@@ -50,8 +50,8 @@ pub struct WallStrain {
     pub half_width: f64,
     /// The lesser principal strain.
     pub lesser: f64,
-    /// The least strain all round that the motions leave possible, by the largest that instruments and temperature
-    /// explain: beyond one, a wrong scale.
+    /// The least strain all round that the motions leave possible, divided by the largest that instruments and
+    /// temperature explain; above one, the scale is wrong.
     pub excess: f64,
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use std::ops::AddAssign;
 
-/// Information that keeps a rotation solvable which no point determines; far below any that counts.
+/// Information that keeps a rotation solvable where no point determines it; far below any that counts.
 const RIDGE: f64 = 1e-9;
 
 /// Log likelihood of a stone's observations as a quadratic in its motion x, in the stone's frame:

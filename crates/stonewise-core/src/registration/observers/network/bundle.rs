@@ -131,7 +131,7 @@ impl BundleEquations {
     }
 }
 
-/// The sights in photos of which a bundle has the unknowns.
+/// The sights in photos whose unknowns a bundle has.
 fn of_photos<'a>(sights: &[&'a Sight], unknowns: &BTreeMap<usize, [usize; 2]>) -> Vec<&'a Sight> {
     let known = sights.iter().copied();
     known.filter(|s| unknowns.contains_key(&s.photo)).collect()
