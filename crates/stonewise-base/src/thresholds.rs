@@ -290,7 +290,7 @@ impl Pair {
             return error(
                 *key,
                 attention,
-                format!("{side} {alarm_key} = {alarm}: attention comes before the alarm"),
+                format!("{side} {alarm_key} = {alarm}: attention must be reached before the alarm"),
             );
         }
         Ok(())

@@ -222,7 +222,7 @@ static ENGLISH: Texts = Texts {
         ],
         levels: ["attention", "alarm"],
         rate_not_judged: "velocities cannot be compared with their thresholds: give the dates of both epochs, or of three in a series",
-        departure_not_judged: "departures from the model cannot be compared with their thresholds: a model takes four epochs with a date",
+        departure_not_judged: "departures from the model cannot be compared with their thresholds: a model needs four epochs with dates",
         mm_a_year: "mm a year",
         standard_deviations: "standard deviations",
         moved: [
@@ -288,7 +288,7 @@ static ENGLISH: Texts = Texts {
             "a zone of {size} bulged by {length} mm against {against} (95 % interval {low} to {high} mm)",
             "a zone of {size} leaned by {length} mm against {against} (95 % interval {low} to {high} mm)",
             "a zone of {size} settled by {length} mm against {against} (95 % interval {low} to {high} mm)",
-            "a zone of {size} stepped out of line by {length} mm against {against} (95 % interval {low} to {high} mm)",
+            "a zone of {size} shifted as a whole by {length} mm against {against} (95 % interval {low} to {high} mm)",
             "a zone of {size} moved by {length} mm against {against} (95 % interval {low} to {high} mm)",
         ],
         pressed_in: "a zone of {size} was pressed in by {length} mm against {against} (95 % interval {low} to {high} mm)",
@@ -411,12 +411,12 @@ static ENGLISH: Texts = Texts {
     ],
     terms: [
         "the stone itself and its neighbours",
-        "what points of stones share",
+        "errors shared by points of stones",
         "poses of tracked photos",
         "interior orientation of photos",
         "scale of the epochs",
         "registration of the epochs",
-        "the common motion",
+        "common motion",
     ],
 };
 
@@ -653,13 +653,13 @@ static GERMAN: Texts = Texts {
         "die Oberfl\u{e4}che ist zu eben, um die Bewegung zu zeigen",
     ],
     terms: [
-        "den Stein selbst und seine Nachbarn",
-        "Gemeinsames der Punkte von Steinen",
+        "der Stein selbst und seine Nachbarn",
+        "gemeinsame Fehler der Punkte von Steinen",
         "Posen verfolgter Fotos",
         "innere Orientierung der Fotos",
-        "den Ma\u{df}stab der Epochen",
-        "die Registrierung der Epochen",
-        "die gemeinsame Bewegung",
+        "Ma\u{df}stab der Epochen",
+        "Registrierung der Epochen",
+        "gemeinsame Bewegung",
     ],
 };
 

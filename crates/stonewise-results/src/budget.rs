@@ -55,9 +55,12 @@ impl FromStr for Term {
 
     fn from_str(name: &str) -> Result<Self, String> {
         let known = Self::ALL.into_iter().find(|term| term.name() == name);
-        known.ok_or_else(|| format!("{name:?} is no term of a budget"))
+        known.ok_or_else(|| format!("{name:?} is not a term of a budget"))
     }
 }
+
+/// Variance that counts as none, m^2: that of a nanometre, beside which sums of covariances are rounded.
+const NOTHING_M2: f64 = 1e-18;
 
 /// Variances that terms add to a motion along the wall, up and out, m^2. Their sum is the variance of the motion.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -85,7 +88,7 @@ impl Budget {
     }
 
     fn add(&mut self, term: Term, variances: Vector3<f64>) {
-        if variances != Vector3::zeros() {
+        if variances.amax() > NOTHING_M2 {
             *self.0.entry(term).or_default() += variances;
         }
     }

@@ -87,7 +87,7 @@ fn with_fixed(results: &ResultSet, fixed: &BTreeSet<u32>) -> Result<Vec<StoneRow
     let rigid = SmallMotion::fit(&samples).filter(|_| samples.len() >= LEAST_STONES);
     let rigid = rigid.ok_or_else(|| {
         format!(
-            "{} of the {} fixed stones were measured, and {LEAST_STONES} at least are needed: name more stones",
+            "measured of the {1} fixed stones: {0}, and at least {LEAST_STONES} are needed: name more stones",
             samples.len(),
             fixed.len()
         )
@@ -346,7 +346,7 @@ mod tests {
             ("crest", "--fixed crest: there is no such zone"),
             (
                 "1",
-                "1 of the 1 fixed stones were measured, and 3 at least are needed",
+                "measured of the 1 fixed stones: 1, and at least 3 are needed",
             ),
         ] {
             let message = of(fixed).unwrap_err().to_string();

@@ -15,7 +15,7 @@ const DESCRIPTION: &str =
 pub fn datum(args: &DatumArgs, printer: &Printer) -> Result<Outcome> {
     if args.out.exists() {
         bail!(
-            "{} is there: give another --out, or remove it",
+            "{} exists already: give another --out, or remove it",
             args.out.display()
         );
     }

@@ -156,11 +156,7 @@ fn rates_and_departures_of_a_series_are_judged_with_its_newest_epoch() {
         assert_eq!(judge(&earlier, &set).state, State::Fine);
     }
     let departed = judge(&wall(0, 0.0, 12), &thresholds("departure_alarm_sd = 4"));
-    assert!(
-        departed
-            .sentence
-            .contains("a model takes four epochs with a date")
-    );
+    assert!(departed.sentence.contains("a model needs four epochs with dates"));
 }
 
 #[test]

@@ -27,7 +27,7 @@ static SETTLED: Rule = Rule {
     message: &NOT_CONVERGED,
     limit: 0.0,
     source: "the adjustment ends when nine tenths of the stones have settled, or after `max_iterations`",
-    remedy: "look at masks and cameras of both epochs, or raise `max_iterations`",
+    remedy: "check the masks and cameras of both epochs, or raise `max_iterations`",
 };
 static MEASURED: Rule = Rule {
     message: &FEW_MEASURED,
@@ -50,8 +50,8 @@ static CONFIRMED: Rule = Rule {
 static SENSITIVE: Rule = Rule {
     message: &BLIND,
     limit: LIMIT_EXCESS,
-    source: "hundred times what spacing and noise of the points allow",
-    remedy: "look at masks, cameras and overlap of the epochs",
+    source: "a hundred times what spacing and noise of the points allow",
+    remedy: "check masks, cameras and overlap of the epochs",
 };
 
 /// The adjustment stopped before its motions had settled.
