@@ -32,11 +32,13 @@ pub struct KnownMotion {
     stones: Option<Arc<MovedStones>>,
 }
 
+/// Moved places of stones by cell, with their displacements; one for each stone of a cell.
+type Places = HashMap<[i64; 3], Vec<(Point3<f64>, Vector3<f64>)>>;
+
 struct MovedStones {
     labels: DiskLabels,
     displacements: BTreeMap<u32, Vector3<f64>>,
-    /// Moved places of stones by cell, with their displacements; one for each stone of a cell.
-    places: HashMap<[i64; 3], Vec<(Point3<f64>, Vector3<f64>)>>,
+    places: Places,
 }
 
 impl KnownMotion {
@@ -55,7 +57,7 @@ impl KnownMotion {
         displacements: BTreeMap<u32, Vector3<f64>>,
         surveyed: &DiskTiles,
     ) -> Result<Self> {
-        let mut places: HashMap<[i64; 3], Vec<(Point3<f64>, Vector3<f64>)>> = HashMap::new();
+        let mut places = Places::new();
         for tile in 0..surveyed.tile_count() {
             let (cloud, stones) = (surveyed.load(tile)?, labels.read(tile)?.stone);
             for (i, stone) in stones.iter().enumerate() {
