@@ -201,7 +201,7 @@ mod tests {
         let held = equations.information + Matrix6::identity() * (3.0 / MOVE_M.powi(2));
         let mut x = Vector6::zeros();
         for _ in 0..2000 {
-            for k in 0..9 {
+            for k in 0..6 {
                 x[k] -= (equations.gradient[k] + held.row(k).dot(&x.transpose())) / held[(k, k)];
             }
         }
