@@ -82,7 +82,7 @@ const BASE: Layers = &[
 ];
 
 const RESULTS: Layers = &[
-    &["calendar", "names"],
+    &["budget", "calendar", "names"],
     &[
         "change_points",
         "facade",
