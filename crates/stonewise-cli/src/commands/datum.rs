@@ -12,12 +12,9 @@ const DESCRIPTION: &str =
     "Motions of the stones against the rigid motion of the stones that were taken as fixed.";
 
 /// Writes the motions of finished results against stones that are taken as fixed.
-pub fn datum(args: &DatumArgs, printer: &Printer) -> Result<Outcome> {
-    if args.out.exists() {
-        bail!(
-            "{} exists already: give another --out, or remove it",
-            args.out.display()
-        );
+pub fn datum(args: &DatumArgs, force: bool, printer: &Printer) -> Result<Outcome> {
+    if args.out.exists() && !force {
+        bail!("{} exists; --force replaces it", args.out.display());
     }
     let table = fixed_datum(&args.results, &args.fixed)?;
     write_csv(&args.out, &table, DESCRIPTION, None)?;

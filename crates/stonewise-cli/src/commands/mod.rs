@@ -64,7 +64,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::Explain(args) => explain::explain(&args),
         Command::Edits(which) => edits::edits(&which, printer),
         Command::Verify(args) => verify::verify(&args, printer),
-        Command::Datum(args) => datum::datum(&args, printer),
+        Command::Datum(args) => datum::datum(&args, force, printer),
         Command::Design(args) => design::design(&args, force, printer),
         Command::Evaluate(args) => evaluate::evaluate(&args, printer),
         Command::Compare(which) => compare::compare(&which, force, printer),
