@@ -33,14 +33,13 @@ mod lab {
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// Names of all mechanisms that can be switched off.
-    pub const SWITCHES: [&str; 28] = [
+    pub const SWITCHES: [&str; 27] = [
         "across",
         "bodies",
         "correlation",
         "covered",
         "crack",
         "foreign",
-        "halves",
         "obs_average",
         "obs_drift",
         "obs_gross",

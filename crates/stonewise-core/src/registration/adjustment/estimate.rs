@@ -4,7 +4,7 @@ use super::candidate::Moving;
 use super::field::{Prediction, covariance_against, posterior};
 use super::observation::NormalEquations;
 use super::solution::Solution;
-use super::state::{Adjustment, Evidence, StoneState};
+use super::state::{Adjustment, StoneState};
 use super::stone_vector::StoneVector;
 use crate::switches::{is_on, switchable};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
@@ -15,9 +15,6 @@ const OUTSIDE: f64 = 0.05;
 /// Probability, before its observations, that a stone beside a crack moves with the other side: cracks follow joints, and
 /// the line that stands for one cuts off the corners.
 const ACROSS: f64 = 0.1;
-/// Probability that a stone is loose if its points favour its own motion but one of its halves contradicts it: masks
-/// that took in something else on one side are taken to be twice as frequent as loose stones.
-const CONTRADICTED: f64 = 0.3;
 
 /// A stone's motion with its looseness averaged out, in its frame.
 pub(crate) struct Estimate {
@@ -53,10 +50,9 @@ impl Adjustment {
     /// A stone's motion about the common motion.
     ///
     /// Where the stone is not followed on its own, it moves with its neighbours, and its covariance is
-    /// widened for the chance that it does not ([`widening`]). If its observations contradict each other, it moves with
-    /// its neighbours, and its covariance allows for its own motion. Otherwise mean and covariance are those of the
-    /// mixture of three cases: it moves with the field, it is loose, or its clouds show it at a wrong place, and
-    /// only photos and neighbours say where it is. Beside a crack, the field is a mixture of that of either side.
+    /// widened for the chance that it does not ([`widening`]). Otherwise mean and covariance are those of the mixture of
+    /// three cases: it moves with the field, it is loose, or its clouds show it at a wrong place, and only photos and
+    /// neighbours say where it is. Beside a crack, the field is a mixture of that of either side.
     ///
     /// `shared`: variances of errors that a stone's points share, against its neighbours; they are in the
     /// relative covariance. `across_m`: by how much the stones beyond a crack beside it moved more, in its frame.
@@ -129,11 +125,7 @@ impl Adjustment {
         let loose = case(prediction, at_own, &self.prior.loose_variances(), 0.0);
         let wrong = case(prediction, &without_clouds, &own, slide_m2);
         cases.extend([loose.of_probability(p_loose), wrong.of_probability(p_wrong)]);
-        let mixture = Estimate::of(&cases);
-        match stone.evidence {
-            Evidence::Contradictory => mixture.about(with_neighbours),
-            Evidence::TooWeak | Evidence::Decides => mixture,
-        }
+        Estimate::of(&cases)
     }
 
     /// By how much the stones beyond a crack beside each stone moved more than it, in its frame; `None` for a stone with
@@ -157,12 +149,11 @@ impl Adjustment {
     }
 
     /// Probability that a stone is loose; where its own observations are too weak to tell, what is expected of any
-    /// stone, and where they contradict each other, [`CONTRADICTED`].
+    /// stone.
     pub fn p_loose(&self, stone: &StoneState) -> f64 {
-        match stone.evidence {
-            Evidence::TooWeak => self.prior.loose.share,
-            Evidence::Contradictory => CONTRADICTED,
-            Evidence::Decides => (1.0 - stone.p_with_field) * (1.0 - stone.doubt),
+        match stone.decides {
+            true => (1.0 - stone.p_with_field) * (1.0 - stone.doubt),
+            false => self.prior.loose.share,
         }
     }
 }
@@ -190,17 +181,6 @@ impl Estimate {
             sum.by_field += case.by_field * p;
         }
         sum
-    }
-
-    /// The mean of another estimate, with the second moments of this one about it as covariance.
-    fn about(self, other: Self) -> Self {
-        let apart = *(self.mean - other.mean).unknowns();
-        let between = apart * apart.transpose();
-        Self {
-            covariance: self.covariance + between,
-            relative_covariance: self.relative_covariance + between.fixed_view::<3, 3>(0, 0),
-            ..other
-        }
     }
 }
 

@@ -3,7 +3,7 @@
 use super::candidate::CandidateMotion;
 use super::covered::covered;
 use super::error::AdjustError;
-use super::hypothesis::{LikelihoodRatio, LikelihoodRatioTest, Placed, Probe};
+use super::hypothesis::{LikelihoodRatioTest, Placed, Probe};
 use super::observation::surface::{
     Correlation, Effort, Equations, LocalPair, NoiseFactors, estimate_noise, likely_roughness,
 };
@@ -18,7 +18,7 @@ use rayon::prelude::*;
 struct Evaluation {
     with_field: Equations,
     on_own: Option<Equations>,
-    ratio: Option<LikelihoodRatio>,
+    log_ratio: Option<f64>,
     roughness: f64,
 }
 
@@ -139,10 +139,7 @@ impl Adjustment {
                 noise: &self.surface.noise,
                 layout: &self.surface.layout,
             };
-            // Without equations the noise may have changed, and the earlier result for the halves no longer holds.
-            let is_known = stone.with_field.surface.equations().is_some();
-            let known = stone.ratio.halves.as_ref().filter(|_| is_known);
-            test.run(self.surface.inflation_of_all(stone.surface()), known)
+            test.log_ratio()
         };
 
         // The ratio is that of both present motions, so the equations must belong to them as well.
@@ -150,7 +147,7 @@ impl Adjustment {
         Evaluation {
             with_field: anew(&stone.with_field),
             on_own: own.map(anew),
-            ratio: own.map(compare),
+            log_ratio: own.map(compare),
             roughness,
         }
     }
@@ -204,7 +201,7 @@ impl Adjustment {
 
 impl Evaluation {
     fn store(self, stone: &mut StoneState) {
-        stone.ratio = self.ratio.unwrap_or_default();
+        stone.log_ratio = self.log_ratio.unwrap_or_default();
         stone.roughness = self.roughness;
         stone.is_roughness_due = false;
         let at = stone.with_field.motion;
@@ -424,11 +421,11 @@ mod tests {
         assert!(error.translation().norm() < 0.004, "{error:?}");
         // Both motions are compared on the same points, and its own is far more likely.
         assert!(
-            adjustment.stones[20].ratio.log_ratio > 5.0,
+            adjustment.stones[20].log_ratio > 5.0,
             "{:?}",
-            adjustment.stones[20].ratio
+            adjustment.stones[20].log_ratio
         );
         let other = (0..40).find(|i| !followed.contains(i)).unwrap();
-        assert_eq!(adjustment.stones[other].ratio.log_ratio, 0.0);
+        assert_eq!(adjustment.stones[other].log_ratio, 0.0);
     }
 }

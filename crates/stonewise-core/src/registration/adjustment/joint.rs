@@ -6,7 +6,7 @@ use super::field::{information, stone_from_field};
 use super::joint_motions::{JointMotions, JointStone, Pull};
 use super::octaves::Octaves;
 use super::solution::Solution;
-use super::state::{Adjustment, Evidence};
+use super::state::Adjustment;
 use crate::linalg::{root, without_negative};
 use crate::stone::{MotionFailure, PairResult};
 use nalgebra::{Matrix3, Vector6};
@@ -60,9 +60,7 @@ pub(super) fn joint_motions(
             face_from_world: frame,
             body: results[i].body,
             // Nor is a stone firm whose clouds show it elsewhere, whether they are right or not.
-            is_loose: motion.loose
-                || adjustment.stones[i].moving() == Moving::OnOwn
-                || adjustment.stones[i].evidence == Evidence::Contradictory,
+            is_loose: motion.loose || adjustment.stones[i].moving() == Moving::OnOwn,
             displacement: motion.displacement,
             by_field,
             own,

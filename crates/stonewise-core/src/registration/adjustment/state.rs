@@ -2,7 +2,6 @@
 
 use super::candidate::{CandidateMotion, Moving};
 use super::field::{LoosePrior, MotionPrior, Place};
-use super::hypothesis::LikelihoodRatio;
 use super::observation::photo::PhotoModel;
 use super::observation::surface::{Layout, StoneSurface, SurfaceModel};
 use super::params::AdjustmentParams;
@@ -29,17 +28,6 @@ pub(crate) struct Adjustment {
     pub params: AdjustmentParams,
 }
 
-/// Whether a stone's observations tell a loose stone from one that moves with the field.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Evidence {
-    /// They tell.
-    Decides,
-    /// They hardly constrain its motion.
-    TooWeak,
-    /// They favour its own motion, and one of its halves contradicts it.
-    Contradictory,
-}
-
 /// A stone between iterations.
 pub(crate) struct StoneState {
     pub info: StoneInfo,
@@ -49,8 +37,9 @@ pub(crate) struct StoneState {
     pub with_field: CandidateMotion,
     /// Moving on its own, where that is followed.
     pub on_own: Option<CandidateMotion>,
-    /// What the stone's points say between the two.
-    pub ratio: LikelihoodRatio,
+    /// Log likelihood of the stone's own motion less that of the field's, on the same points; 0 where its own is not
+    /// followed.
+    pub log_ratio: f64,
     /// Roughness of its surface over that of most stones.
     pub roughness: f64,
     /// Whether that is to be estimated anew.
@@ -60,7 +49,7 @@ pub(crate) struct StoneState {
     /// Probability that the clouds show it at a wrong place, if they show it away from its neighbours.
     pub doubt: f64,
     /// Whether its observations tell a loose stone from one that moves with the field.
-    pub evidence: Evidence,
+    pub decides: bool,
     /// Whether its last step exceeded a tenth of the uncertainty of its motion.
     pub moves: bool,
     /// Whether its last step exceeded the uncertainty of its motion.
@@ -144,12 +133,12 @@ impl StoneState {
             start: translation,
             with_field: CandidateMotion::new(StoneVector::from_translation(translation)),
             on_own: None,
-            ratio: LikelihoodRatio::default(),
+            log_ratio: 0.0,
             roughness: 1.0,
             is_roughness_due: false,
             p_with_field: 1.0,
             doubt: 0.0,
-            evidence: Evidence::Decides,
+            decides: true,
             moves: false,
             swings: false,
             effective_freedom: 0.0,

@@ -62,14 +62,12 @@ impl LocalPair {
         [self.first.len(), self.second.len()]
     }
 
-    /// The points that count where the window moved by `window`, and no others: of the second epoch those in
-    /// the window, of both those whose place in the first epoch `keep` takes.
-    pub fn counting(&self, window: &StoneVector, keep: impl Fn(&[f64; 3]) -> bool) -> Self {
+    /// The points that count where the window moved by `window`, and no others.
+    pub fn counting(&self, window: &StoneVector) -> Self {
         let window = LocalMotion::new(window);
-        let second = self.second_in(&window).into_iter().map(|(_, q)| q);
-        let second: Vec<[f64; 3]> = second.filter(|q| keep(&window.undo(q))).collect();
+        let second: Vec<[f64; 3]> = self.second_in(&window).into_iter().map(|(_, q)| q).collect();
         Self {
-            first: self.first.iter().filter(|p| keep(p)).copied().collect(),
+            first: self.first.clone(),
             labelled: second.len(),
             second,
             window: None,
