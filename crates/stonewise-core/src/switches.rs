@@ -33,7 +33,7 @@ mod lab {
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// Names of all mechanisms that can be switched off.
-    pub const SWITCHES: [&str; 27] = [
+    pub const SWITCHES: [&str; 26] = [
         "across",
         "bodies",
         "correlation",
@@ -46,7 +46,6 @@ mod lab {
         "obs_stretch",
         "obs_widened",
         "octaves_shown",
-        "partial",
         "probe",
         "restart",
         "room",

@@ -1,6 +1,5 @@
 //! A stone's motion, and how it departs from its neighbours', with looseness averaged out.
 
-use super::candidate::Moving;
 use super::field::{Prediction, covariance_against, posterior};
 use super::observation::NormalEquations;
 use super::solution::Solution;
@@ -51,8 +50,7 @@ impl Adjustment {
     ///
     /// Where the stone is not followed on its own, it moves with its neighbours, and its covariance is
     /// widened for the chance that it does not ([`widening`]). Otherwise mean and covariance are those of the mixture of
-    /// three cases: it moves with the field, it is loose, or its clouds show it at a wrong place, and only photos and
-    /// neighbours say where it is. Beside a crack, the field is a mixture of that of either side.
+    /// two cases: it moves with the field, or it is loose. Beside a crack, the field is a mixture of that of either side.
     ///
     /// `shared`: variances of errors that a stone's points share, against its neighbours; they are in the
     /// relative covariance. `across_m`: by how much the stones beyond a crack beside it moved more, in its frame.
@@ -112,19 +110,13 @@ impl Adjustment {
                 ..with_neighbours
             };
         };
-        let p_wrong = stone.p_wrong();
-        let p_tied = 1.0 - p_loose - p_wrong;
-        let photos = self.observed_by_photos(i, Moving::WithField);
-
-        let without_clouds = photos.unwrap_or_else(NormalEquations::nothing);
         let scaled = |case: Case| Case {
-            probability: p_tied * case.probability,
+            probability: (1.0 - p_loose) * case.probability,
             ..case
         };
         let mut cases: Vec<Case> = tied.into_iter().map(scaled).collect();
         let loose = case(prediction, at_own, &self.prior.loose_variances(), 0.0);
-        let wrong = case(prediction, &without_clouds, &own, slide_m2);
-        cases.extend([loose.of_probability(p_loose), wrong.of_probability(p_wrong)]);
+        cases.push(loose.of_probability(p_loose));
         Estimate::of(&cases)
     }
 
@@ -152,7 +144,7 @@ impl Adjustment {
     /// stone.
     pub fn p_loose(&self, stone: &StoneState) -> f64 {
         match stone.decides {
-            true => (1.0 - stone.p_with_field) * (1.0 - stone.doubt),
+            true => 1.0 - stone.p_with_field,
             false => self.prior.loose.share,
         }
     }

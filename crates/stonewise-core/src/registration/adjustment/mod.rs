@@ -25,7 +25,6 @@ pub(crate) mod observation;
 mod octaves;
 mod outcome;
 mod params;
-mod partial_view;
 mod phases;
 mod restart;
 mod significance;
