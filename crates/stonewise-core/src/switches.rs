@@ -33,7 +33,7 @@ mod lab {
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// Names of all mechanisms that can be switched off.
-    pub const SWITCHES: [&str; 26] = [
+    pub const SWITCHES: [&str; 25] = [
         "across",
         "bodies",
         "correlation",
@@ -47,7 +47,6 @@ mod lab {
         "obs_widened",
         "octaves_shown",
         "probe",
-        "restart",
         "room",
         "roughness",
         "sensors",

@@ -132,13 +132,6 @@ impl<'r, 'a, S: PairSource> Iteration<'r, 'a, S> {
 pub(super) struct Evaluated<'r, 'a, S>(&'r mut Run<'a, S>);
 
 impl<'r, 'a, S: PairSource> Evaluated<'r, 'a, S> {
-    /// Returns stones from false optima to where their surroundings moved, and evaluates them there.
-    pub fn restart(self) -> Result<Self, AdjustError<S::Error>> {
-        self.0.adjustment.restart(&self.0.points)?;
-        self.0.adjustment.evaluate(&self.0.points)?;
-        Ok(self)
-    }
-
     /// Tries stones far from the field's motion, and evaluates them at the best place found, from which they are
     /// followed.
     pub fn probe(self) -> Result<Self, AdjustError<S::Error>> {

@@ -26,12 +26,12 @@ mod octaves;
 mod outcome;
 mod params;
 mod phases;
-mod restart;
 mod significance;
 mod solution;
 mod state;
 mod step;
 pub(crate) mod stone_vector;
+mod surroundings;
 mod survey;
 #[cfg(test)]
 pub(super) mod testing;

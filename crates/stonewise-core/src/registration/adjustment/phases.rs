@@ -70,15 +70,14 @@ impl<'a, S: PairSource> Surveyed<'a, S> {
 pub(super) struct Aligned<'a, S>(Run<'a, S>);
 
 impl<'a, S: PairSource> Aligned<'a, S> {
-    /// Estimates noise and roughness for good, returns stones from false optima, and tries stones far from the field's
-    /// motion.
+    /// Estimates noise and roughness for good, and tries stones far from the field's motion.
     pub fn probe(self) -> Phase<Probed<'a, S>, S> {
         let mut run = self.0;
         run.set_effort(Effort::Weighing);
         if let Some(mut iteration) = run.begin() {
             iteration.estimate_noise();
             iteration.mark_roughness_due();
-            let evaluated = iteration.evaluate()?.restart()?.probe()?;
+            let evaluated = iteration.evaluate()?.probe()?;
             evaluated.solve_and_reweight()?.step();
         }
         Ok(Probed(run))
