@@ -33,9 +33,8 @@ mod lab {
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// Names of all mechanisms that can be switched off.
-    pub const SWITCHES: [&str; 25] = [
+    pub const SWITCHES: [&str; 24] = [
         "across",
-        "bodies",
         "correlation",
         "covered",
         "crack",
