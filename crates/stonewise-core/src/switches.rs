@@ -33,7 +33,7 @@ mod lab {
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// Names of all mechanisms that can be switched off.
-    pub const SWITCHES: [&str; 24] = [
+    pub const SWITCHES: [&str; 23] = [
         "across",
         "correlation",
         "covered",
@@ -47,7 +47,6 @@ mod lab {
         "octaves_shown",
         "probe",
         "room",
-        "roughness",
         "sensors",
         "shared",
         "slide",

@@ -128,8 +128,7 @@ fn happened(name: &str) -> Vec<WallMotion> {
 type Kind = (&'static str, &'static [&'static str], &'static str, fn(&mut Plan));
 
 /// Mechanisms by what happens: `probe` far; `covered`, `foreign` ivy; `room`, `two_surfaces` partners, masks;
-/// `roughness` hut; `sensors` other_sensor;
-/// `correlation`, `stone_factor`, `slopes` lines; `crack`, `across` crack; `zone` creep; `octaves_shown`, `shared`
+/// `sensors` other_sensor; `correlation`, `stone_factor`, `slopes` lines; `crack`, `across` crack; `zone` creep; `octaves_shown`, `shared`
 /// photos; `obs_*` every survey with sources, above all stable, merged and the faults of sources at the end.
 const KINDS: [Kind; 32] = [
     ("masks", &["tls", "uav", "photos"], "combo", |p| {

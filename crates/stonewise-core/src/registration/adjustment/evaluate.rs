@@ -5,7 +5,7 @@ use super::covered::covered;
 use super::error::AdjustError;
 use super::hypothesis::{LikelihoodRatioTest, Placed, Probe};
 use super::observation::surface::{
-    Correlation, Effort, Equations, LocalPair, NoiseFactors, estimate_noise, likely_roughness,
+    Correlation, Effort, Equations, LocalPair, estimate_noise,
 };
 use super::state::{Adjustment, StoneState};
 use super::stone_vector::StoneVector;
@@ -19,7 +19,6 @@ struct Evaluation {
     with_field: Equations,
     on_own: Option<Equations>,
     log_ratio: Option<f64>,
-    roughness: f64,
 }
 
 impl Adjustment {
@@ -55,23 +54,10 @@ impl Adjustment {
         }
     }
 
-    /// Marks the roughness of every stone to be estimated at its next evaluation.
-    pub fn mark_roughness_due(&mut self) {
-        switchable!("roughness");
-        self.stones
-            .iter_mut()
-            .for_each(|stone| stone.is_roughness_due = true);
-    }
-
     /// The points of a stone in its frame.
     pub fn local_pair(&self, i: usize, pair: &PairPoints) -> LocalPair {
         let face_from_world = &self.prior.graph.nodes[i].face_from_world;
-        let stone = &self.stones[i];
-        let noise = NoiseFactors {
-            points: stone.info.noise_factors,
-            roughness: stone.roughness,
-        };
-        LocalPair::new(pair, face_from_world, noise)
+        LocalPair::new(pair, face_from_world, self.stones[i].info.noise_factors)
     }
 
     /// Normal equations of all stones that moved since they were last evaluated.
@@ -119,11 +105,7 @@ impl Adjustment {
     /// Evaluates the points of a stone at its present motions.
     fn evaluate_one(&self, i: usize, pair: &PairPoints) -> Evaluation {
         let stone = &self.stones[i];
-        let mut local = self.local_pair(i, pair);
-        if stone.is_roughness_due {
-            local.noise.roughness = self.likely_roughness(stone, &local);
-        }
-        let roughness = local.noise.roughness;
+        let local = self.local_pair(i, pair);
         let anew = |candidate: &CandidateMotion| {
             let window = candidate.surface.window(&candidate.motion);
             let weights = candidate.surface.weights(&candidate.motion);
@@ -148,16 +130,7 @@ impl Adjustment {
             with_field: anew(&stone.with_field),
             on_own: own.map(anew),
             log_ratio: own.map(compare),
-            roughness,
         }
-    }
-
-    /// Most likely roughness of a stone at its present motion, as a factor on the usual one.
-    fn likely_roughness(&self, stone: &StoneState, pair: &LocalPair) -> f64 {
-        // Equations from which the stone's own factor could follow are yet to be evaluated.
-        let inflation = self.surface.correlation.factor();
-        let motion = &stone.more_probable().motion;
-        likely_roughness(pair, motion, inflation, &self.surface.noise, &self.surface.layout)
     }
 
     /// Tries stones at a distance. Where another place fits better, a stone is followed on its own from there.
@@ -202,8 +175,6 @@ impl Adjustment {
 impl Evaluation {
     fn store(self, stone: &mut StoneState) {
         stone.log_ratio = self.log_ratio.unwrap_or_default();
-        stone.roughness = self.roughness;
-        stone.is_roughness_due = false;
         let at = stone.with_field.motion;
         stone.with_field.surface.set(at, self.with_field);
         if let (Some(equations), Some(own)) = (self.on_own, &mut stone.on_own) {
@@ -312,7 +283,7 @@ mod tests {
         assert_eq!([0, 71].map(|i| gradient(&adjustment, i)), [before[0], before[2]]);
         // Brute force: the stone's points alone at its new motion.
         let frame = &adjustment.prior.graph.nodes[70].face_from_world;
-        let local = LocalPair::new(&source.pairs.pairs()[70], frame, NoiseFactors::USUAL);
+        let local = LocalPair::new(&source.pairs.pairs()[70], frame, [1.0; 2]);
         let alone = adjustment
             .surface
             .equations(&local, &moved, &moved, &PointWeights::NONE);

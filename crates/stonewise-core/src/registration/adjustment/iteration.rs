@@ -116,11 +116,6 @@ impl<'r, 'a, S: PairSource> Iteration<'r, 'a, S> {
         self.0.adjustment.estimate_noise(&self.0.points.sample);
     }
 
-    /// Marks the roughness of every stone to be estimated at its next evaluation.
-    pub fn mark_roughness_due(&mut self) {
-        self.0.adjustment.mark_roughness_due();
-    }
-
     /// Evaluates the points of all stones that moved since they were last evaluated.
     pub fn evaluate(self) -> Result<Evaluated<'r, 'a, S>, AdjustError<S::Error>> {
         self.0.adjustment.evaluate(&self.0.points)?;

@@ -52,11 +52,6 @@ impl<'a, S: PairSource> Surveyed<'a, S> {
             let Some(mut iteration) = run.begin() else { break };
             if round % NOISE_EVERY == 0 {
                 iteration.estimate_noise();
-                // In the first round the epochs are not aligned, so the usual roughness, to which each stone's is
-                // relative, is still wrong by a factor.
-                if round > 0 {
-                    iteration.mark_roughness_due();
-                }
             }
             let mut evaluated = iteration.evaluate()?;
             evaluated.update_components()?;
@@ -70,13 +65,12 @@ impl<'a, S: PairSource> Surveyed<'a, S> {
 pub(super) struct Aligned<'a, S>(Run<'a, S>);
 
 impl<'a, S: PairSource> Aligned<'a, S> {
-    /// Estimates noise and roughness for good, and tries stones far from the field's motion.
+    /// Estimates the noise for good, and tries stones far from the field's motion.
     pub fn probe(self) -> Phase<Probed<'a, S>, S> {
         let mut run = self.0;
         run.set_effort(Effort::Weighing);
         if let Some(mut iteration) = run.begin() {
             iteration.estimate_noise();
-            iteration.mark_roughness_due();
             let evaluated = iteration.evaluate()?.probe()?;
             evaluated.solve_and_reweight()?.step();
         }

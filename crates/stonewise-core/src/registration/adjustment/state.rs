@@ -34,10 +34,6 @@ pub(crate) struct StoneState {
     /// Log likelihood of the stone's own motion less that of the field's, on the same points; 0 where its own is not
     /// followed.
     pub log_ratio: f64,
-    /// Roughness of its surface over that of most stones.
-    pub roughness: f64,
-    /// Whether that is to be estimated anew.
-    pub is_roughness_due: bool,
     /// Probability that the stone moves with the field.
     pub p_with_field: f64,
     /// Whether its observations tell a loose stone from one that moves with the field.
@@ -108,8 +104,6 @@ impl StoneState {
             with_field: CandidateMotion::new(StoneVector::from_translation(translation)),
             on_own: None,
             log_ratio: 0.0,
-            roughness: 1.0,
-            is_roughness_due: false,
             p_with_field: 1.0,
             decides: true,
             moves: false,

@@ -47,7 +47,6 @@ mod tests {
     use crate::cloud::Cloud;
     use crate::geometry::FaceFrame;
     use crate::id::StoneId;
-    use crate::registration::adjustment::observation::surface::NoiseFactors;
     use crate::registration::adjustment::observation::surface::{FitOptions, equations};
     use crate::registration::points::PairPoints;
     use crate::registration::points::{NearPoint, stone_points};
@@ -111,7 +110,7 @@ mod tests {
         LocalPair::new(
             &pair,
             &FaceFrame::from_normal(&normal).face_from_world(),
-            NoiseFactors::USUAL,
+            [1.0; 2],
         )
     }
 
