@@ -7,7 +7,7 @@ mod yearly;
 
 pub(crate) use instruments::InstrumentTexts;
 pub(crate) use report::{
-    AuditTexts, ChartTexts, MapTexts, MethodTexts, ScoreTexts, SectionTexts, StoneTexts,
+    AuditTexts, ChartTexts, CheckTexts, MapTexts, MethodTexts, ScoreTexts, SectionTexts, StoneTexts,
 };
 pub(crate) use series::SeriesTexts;
 pub(crate) use stonewise_base::messages::fill;
@@ -35,6 +35,7 @@ pub(crate) struct Texts {
     pub stones: StoneTexts,
     pub maps: MapTexts,
     pub charts: ChartTexts,
+    pub checks: CheckTexts,
     pub scores: ScoreTexts,
     pub method: MethodTexts,
     pub audit: AuditTexts,
@@ -391,6 +392,7 @@ static ENGLISH: Texts = Texts {
     stones: StoneTexts::ENGLISH,
     maps: MapTexts::ENGLISH,
     charts: ChartTexts::ENGLISH,
+    checks: CheckTexts::ENGLISH,
     scores: ScoreTexts::ENGLISH,
     method: MethodTexts::ENGLISH,
     audit: AuditTexts::ENGLISH,
@@ -634,6 +636,7 @@ static GERMAN: Texts = Texts {
     stones: StoneTexts::GERMAN,
     maps: MapTexts::GERMAN,
     charts: ChartTexts::GERMAN,
+    checks: CheckTexts::GERMAN,
     scores: ScoreTexts::GERMAN,
     method: MethodTexts::GERMAN,
     audit: AuditTexts::GERMAN,

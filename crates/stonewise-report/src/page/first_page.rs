@@ -323,7 +323,7 @@ pub(super) fn said(english: &str, german: Option<&str>, texts: &Texts) -> String
     }
 }
 
-fn with_code(message: &str) -> String {
+pub(super) fn with_code(message: &str) -> String {
     let escaped = escape(message);
     if escaped.matches('`').count() % 2 == 1 {
         return escaped;

@@ -2,6 +2,7 @@
 
 mod audit;
 mod block;
+mod checks;
 mod distributions;
 mod document;
 mod doubts;
@@ -39,7 +40,7 @@ use stonewise_results::{Comparison, Joint, ResultSet, compare, joints};
 pub(super) use explorer::{SCRIPT, STYLE};
 
 /// Sections in the order of the page.
-fn sections(texts: &Texts) -> [(&'static str, &'static str); 10] {
+fn sections(texts: &Texts) -> [(&'static str, &'static str); 11] {
     let names = &texts.sections;
     [
         ("summary", texts.page.summary),
@@ -49,6 +50,7 @@ fn sections(texts: &Texts) -> [(&'static str, &'static str); 10] {
         ("distributions", names.distributions),
         ("datum", names.datum),
         ("instruments", texts.instruments.heading),
+        ("checks", texts.checks.heading),
         ("evaluation", names.evaluation),
         ("method", names.method),
         ("audit", names.audit),
@@ -150,6 +152,7 @@ fn content(
     }
 
     body.push_str(&instruments::instruments(results, facts.texts()));
+    body.push_str(&checks::checks(results, facts.texts()));
     if let Some(evaluation) = &results.evaluation {
         body.push_str(&evaluation::evaluation(evaluation, facts.texts()));
     }
