@@ -426,8 +426,8 @@ static GERMAN: Texts = Texts {
     tag: "de",
     decimal: ",",
     states: States {
-        fine: "In Ordnung",
-        attention: "Achtung",
+        fine: "Normal",
+        attention: "Aufmerksamkeit",
         alarm: "Alarm",
         cannot_tell: "Keine Aussage m\u{f6}glich",
     },
@@ -464,7 +464,7 @@ static GERMAN: Texts = Texts {
                 "{n} Steine weichen \u{fc}ber die {level} von {t} hinaus von der Vorhersage der Reihe ab",
             ],
         ],
-        levels: ["Warnschwelle", "Alarmschwelle"],
+        levels: ["Aufmerksamkeitsschwelle", "Alarmschwelle"],
         rate_not_judged: "Geschwindigkeiten sind nicht mit ihren Schwellen vergleichbar: es fehlen die Daten beider Epochen oder, in einer Reihe, von dreien",
         departure_not_judged: "Abweichungen vom Modell sind nicht mit ihren Schwellen vergleichbar: ein Modell braucht vier Epochen mit Datum",
         mm_a_year: "mm im Jahr",
@@ -496,24 +496,24 @@ static GERMAN: Texts = Texts {
         datum_unknown: "der Registrierungsfehler zwischen den Aufnahmen ist unbekannt, eine Bewegung der Mauer als Ganzes w\u{e4}re nicht zu sehen",
         none_against_common: "kein Stein hat sich gegen die gemeinsame Bewegung der Mauer bewegt",
         reaches: [
-            "{n} Stein kann die Warnschwelle von {t} erreicht haben: sein Intervall reicht bis zu ihr",
-            "{n} Steine k\u{f6}nnen die Warnschwelle von {t} erreicht haben: ihre Intervalle reichen bis zu ihr",
+            "{n} Stein kann die Aufmerksamkeitsschwelle von {t} erreicht haben: sein Intervall reicht bis zu ihr",
+            "{n} Steine k\u{f6}nnen die Aufmerksamkeitsschwelle von {t} erreicht haben: ihre Intervalle reichen bis zu ihr",
         ],
         joints_reach: [
-            "{n} Fuge kann die Warnschwelle von {t} erreicht haben: ihr Intervall reicht bis zu ihr",
-            "{n} Fugen k\u{f6}nnen die Warnschwelle von {t} erreicht haben: ihre Intervalle reichen bis zu ihr",
+            "{n} Fuge kann die Aufmerksamkeitsschwelle von {t} erreicht haben: ihr Intervall reicht bis zu ihr",
+            "{n} Fugen k\u{f6}nnen die Aufmerksamkeitsschwelle von {t} erreicht haben: ihre Intervalle reichen bis zu ihr",
         ],
         stones_or_joints_reach: [
-            "{n} Stein oder Fuge kann die Warnschwelle von {t} erreicht haben: das Intervall reicht bis zu ihr",
-            "{n} Steine oder Fugen k\u{f6}nnen die Warnschwelle von {t} erreicht haben: ihre Intervalle reichen bis zu ihr",
+            "{n} Stein oder Fuge kann die Aufmerksamkeitsschwelle von {t} erreicht haben: das Intervall reicht bis zu ihr",
+            "{n} Steine oder Fugen k\u{f6}nnen die Aufmerksamkeitsschwelle von {t} erreicht haben: ihre Intervalle reichen bis zu ihr",
         ],
         below: [
-            "der {n} gemessene Stein erreicht die Warnschwelle von {t} nicht",
-            "keiner der {n} gemessenen Steine erreicht die Warnschwelle von {t}",
+            "der {n} gemessene Stein erreicht die Aufmerksamkeitsschwelle von {t} nicht",
+            "keiner der {n} gemessenen Steine erreicht die Aufmerksamkeitsschwelle von {t}",
         ],
         below_with_joints: [
-            "weder der {n} gemessene Stein noch eine Fuge erreicht die Warnschwelle von {t}",
-            "keiner der {n} gemessenen Steine und keine Fuge erreicht die Warnschwelle von {t}",
+            "weder der {n} gemessene Stein noch eine Fuge erreicht die Aufmerksamkeitsschwelle von {t}",
+            "keiner der {n} gemessenen Steine und keine Fuge erreicht die Aufmerksamkeitsschwelle von {t}",
         ],
         none_shown: "keine Bewegung ist nachweisbar",
         not_measured: [
@@ -521,8 +521,8 @@ static GERMAN: Texts = Texts {
             "{n} von {m} Steinen wurden nicht gemessen",
         ],
         deformed_reaches: [
-            "die Verformung von {n} Zone kann die Warnschwelle von {t} erreicht haben",
-            "die Verformungen von {n} Zonen k\u{f6}nnen die Warnschwelle von {t} erreicht haben",
+            "die Verformung von {n} Zone kann die Aufmerksamkeitsschwelle von {t} erreicht haben",
+            "die Verformungen von {n} Zonen k\u{f6}nnen die Aufmerksamkeitsschwelle von {t} erreicht haben",
         ],
         deformed: [
             "die Mauer hat in {n} Zone ihre Form ge\u{e4}ndert",
