@@ -20,6 +20,7 @@ mod pair;
 mod series;
 mod survey;
 mod tracked;
+mod worst_stone;
 mod yearly;
 
 pub(super) use yearly::yearly;
@@ -171,10 +172,11 @@ fn header(results: &ResultSet, facts: &Summary) -> String {
         .as_ref()
         .map_or(&[][..], |run| run.warnings.as_slice());
     format!(
-        "<header>{}<h1>{}</h1>{}{}{}{}{}</header>\n",
+        "<header>{}<h1>{}</h1>{}{}{}{}{}{}</header>\n",
         first_page::letterhead(results, texts.page.kind),
         title(results, texts),
         first_page::verdict(facts),
+        first_page::next(results, facts),
         doubts::doubts(warnings, texts),
         first_page::datum_warning(results.datum(), facts),
         first_page::cover(results, facts),

@@ -54,20 +54,14 @@ fn tiles(facts: &Summary) -> String {
 
     let mm = |metres: Option<f64>| format!("{} <small>mm</small>", texts.mm(metres.unwrap_or(f64::NAN)));
     let largest = facts.verdict.wall.largest;
-    let [what_moved, what_is_largest, what_limit] = match facts.verdict.has_datum() {
-        true => [page.tile_moved, page.tile_largest, page.tile_limit],
-        false => [
-            page.tile_moved_common,
-            page.tile_largest_common,
-            page.tile_limit_common,
-        ],
+    let [what_moved, what_is_largest] = match facts.verdict.has_datum() {
+        true => [page.tile_moved, page.tile_largest],
+        false => [page.tile_moved_common, page.tile_largest_common],
     };
     let tiles = [
         measured,
         tile(of_measured(facts.moved.len()), what_moved),
-        tile(of_measured(facts.above_limit), page.tile_above),
         tile(count(facts.loose.len()), page.tile_loose),
-        tile(mm(facts.limits.median()), what_limit),
         match largest {
             Some(largest) => tile(mm(Some(largest.length_mm / 1e3)), what_is_largest),
             None => tile("\u{2013}".to_owned(), page.tile_no_motion),
