@@ -24,7 +24,7 @@ enum At {
 /// A step that has ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ended {
-    /// Its place in the list and its name, such as "9/14 adjustment of 2026-04".
+    /// Its place in the list and its name, such as "4/6 measure the motions".
     pub step: String,
     /// How long it took, seconds; `None` where it was done earlier.
     pub seconds: Option<f64>,
