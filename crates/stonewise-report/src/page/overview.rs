@@ -220,12 +220,12 @@ fn stone_rows(results: &ResultSet, facts: &Summary, stones: &[(&StoneRow, &RowMo
             format!("<a data-stone=\"{0}\">{0}</a>", s.stone_id),
             texts.number(place.x, 2),
             texts.number(place.y, 2),
-            facts.mm(m.face.x),
-            facts.mm(m.face.y),
-            facts.mm(m.face.z),
-            facts.mm(m.displacement.norm()),
-            facts.mm(m.detection_limit_m),
-            facts.mm(m.relative.norm()),
+            texts.mm(m.face.x),
+            texts.mm(m.face.y),
+            texts.mm(m.face.z),
+            texts.mm(m.displacement.norm()),
+            texts.mm(m.detection_limit_m),
+            texts.mm(m.relative.norm()),
             texts.number(m.rotation.norm() * 1e3, 1),
             if m.loose { names.loose } else { "" }.into(),
         ]
@@ -267,7 +267,7 @@ fn stretches(results: &ResultSet, facts: &Summary) -> String {
         let part: Vec<_> = facts.measured.iter().filter(|(s, _)| inside(s)).collect();
         let above = part.iter().filter(|(_, m)| m.significant).count();
         let median = |of: fn(&RowMotion) -> f64| {
-            facts.mm(Sorted::new(part.iter().map(|(_, m)| of(m)))
+            texts.mm(Sorted::new(part.iter().map(|(_, m)| of(m)))
                 .median()
                 .unwrap_or(f64::NAN))
         };
