@@ -97,7 +97,7 @@ impl Printer {
     pub fn always(&self, line: &str) {
         match &self.shown().screen {
             Some(screen) => screen.above(|| {
-                let lines = wrapped(line, screen.width());
+                let lines = wrapped(line, screen.width(), 2);
                 lines.iter().for_each(|line| note(line));
             }),
             None => note(line),
