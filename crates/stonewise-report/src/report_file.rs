@@ -555,7 +555,7 @@ mod tests {
         let html = settled(&[8, 15], &german);
         assert!(html.starts_with("<!DOCTYPE html>\n<html lang=\"de\">"));
         for words in [
-            "Achtung: 2 von 20 gemessenen Steinen haben sich bewegt",
+            "Aufmerksamkeit: 2 von 20 gemessenen Steinen haben sich bewegt",
             "Temperatur 9,5",
             "<p>Unterschrift</p>",
             "Nachweisgrenze: 1,4\u{a0}mm",

@@ -169,6 +169,25 @@ in_both! {
 }
 
 in_both! {
+    /// The checks of the run.
+    CheckTexts {
+        heading: "Checks", "Prüfungen";
+        intro: "A check that failed puts the results as a whole in doubt.",
+            "Eine nicht bestandene Prüfung macht die Ergebnisse als Ganzes zweifelhaft.";
+        check: "what is checked", "was geprüft wird";
+        epoch: "epoch", "Epoche";
+        value: "value", "Wert";
+        limit: "limit", "Grenze";
+        source: "where the limit is from", "woher die Grenze stammt";
+        outcome: "outcome", "Ergebnis";
+        at_least: "at least {limit}", "mindestens {limit}";
+        at_most: "at most {limit}", "höchstens {limit}";
+        passed: "passed", "bestanden";
+        failed: "failed", "nicht bestanden";
+    }
+}
+
+in_both! {
     /// The score against a known motion.
     ScoreTexts {
         stones: "Stones", "Steine";
