@@ -3,7 +3,7 @@
 //!
 //! `cargo test` tries the same few inputs each time, `BOLERO_RANDOM_ITERATIONS=100000 cargo test -p stonewise
 //! --test mutations` as many as it is told. `cargo bolero test` searches with coverage; see
-//! `docs/src/faults.md`.
+//! `CONTRIBUTING.md`.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
