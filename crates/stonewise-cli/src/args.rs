@@ -85,7 +85,7 @@ pub enum Command {
     /// Work on a page in the browser: look, run, correct, read the report
     #[command(
         after_help = "Examples:\n  stonewise studio survey/\n  stonewise studio results/ --view\n\n\
-        The address goes to stdout; only this machine can reach it. See docs/src/studio.md."
+        The address goes to stdout; only this machine can reach it. See docs/src/edits.md."
     )]
     Studio(StudioArgs),
     /// Write the report of a finished run again, or print it as PDF

@@ -2,7 +2,7 @@
 //! time and memory.
 //!
 //! `cargo test` tries the same few inputs each time; `BOLERO_RANDOM_ITERATIONS` says how many instead, and
-//! `BOLERO_RANDOM_SEED` where to begin. `cargo bolero test` searches with coverage; see `docs/src/faults.md`.
+//! `BOLERO_RANDOM_SEED` where to begin. `cargo bolero test` searches with coverage; see `CONTRIBUTING.md`.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
