@@ -129,7 +129,7 @@ pub fn tell_of_project(project: &Project, printer: &Printer) {
     let words = Words::of(project);
     for note in &project.notes {
         let text = match words.language {
-            Language::English => &note.english,
+            Language::English => note.english.as_str(),
             Language::German => note.in_german(),
         };
         printer.remark(words.note, text, note.code.as_deref());

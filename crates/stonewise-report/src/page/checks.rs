@@ -2,14 +2,17 @@
 
 use super::first_page::with_code;
 use super::html::{section, table};
-use crate::texts::{CheckTexts, Texts, fill};
+use crate::texts::{Texts, fill};
 use stonewise_figure::escape;
 use stonewise_results::ResultSet;
 use stonewise_results::records::CheckRecord;
 
 /// The table of the checks; empty where none is recorded.
 pub(super) fn checks(results: &ResultSet, texts: &Texts) -> String {
-    let checks = results.registration.as_ref().map_or(&[][..], |r| &r.checks);
+    let checks = results
+        .registration
+        .as_ref()
+        .map_or(&[][..], |r| r.checks.as_slice());
     let names = &texts.checks;
     let rows: Vec<Vec<String>> = checks.iter().map(|check| row(check, texts)).collect();
     let head = [
@@ -31,7 +34,7 @@ pub(super) fn checks(results: &ResultSet, texts: &Texts) -> String {
 }
 
 fn row(check: &CheckRecord, texts: &Texts) -> Vec<String> {
-    let names: &CheckTexts = &texts.checks;
+    let names = &texts.checks;
     let limit = match check.at_least {
         true => names.at_least,
         false => names.at_most,

@@ -50,12 +50,13 @@ pub(super) fn verdict(facts: &Summary) -> String {
 pub(super) fn next(results: &ResultSet, facts: &Summary) -> String {
     let page = &facts.texts().page;
     let [fine, look, mend] = page.next;
-    let (next, why) = match facts.verdict.state {
-        State::Fine => (fine, ""),
-        State::Attention if results.thresholds().is_empty() => (look, page.no_thresholds),
-        State::Attention | State::Alarm => (look, ""),
-        State::CannotTell => (mend, ""),
+    let next = match facts.verdict.state {
+        State::Fine => fine,
+        State::Attention | State::Alarm => look,
+        State::CannotTell => mend,
     };
+    let is_by_motion = facts.verdict.state == State::Attention && results.thresholds().is_empty();
+    let why = if is_by_motion { page.no_thresholds } else { "" };
     format!("<p class=\"next\">{why} {next}</p>")
 }
 

@@ -165,6 +165,7 @@ fn motion_map(results: &ResultSet, facts: &Summary) -> String {
     let title = page.map_title;
     let is_sound = facts.verdict.is_sound();
     let end_m = nice_scale_m(norms);
+    let numbers = named(&facts.verdict);
     let picture = MapPicture {
         title,
         value: &norm,
@@ -174,7 +175,7 @@ fn motion_map(results: &ResultSet, facts: &Summary) -> String {
         arrows: true,
         loose: false,
         areas: is_sound,
-        numbers: Some(&named(&facts.verdict)),
+        numbers: Some(&numbers),
     };
 
     let class = if layout.is_wide() { "lead wide" } else { "lead" };
