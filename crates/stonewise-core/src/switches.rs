@@ -33,7 +33,7 @@ mod lab {
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// Names of all mechanisms that can be switched off.
-    pub const SWITCHES: [&str; 23] = [
+    pub const SWITCHES: [&str; 22] = [
         "across",
         "correlation",
         "covered",
@@ -55,7 +55,6 @@ mod lab {
         "swings",
         "tie_t",
         "two_surfaces",
-        "widening",
         "zone",
     ];
 
