@@ -33,7 +33,7 @@ mod lab {
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// Names of all mechanisms that can be switched off.
-    pub const SWITCHES: [&str; 22] = [
+    pub const SWITCHES: [&str; 21] = [
         "across",
         "correlation",
         "covered",
@@ -52,7 +52,6 @@ mod lab {
         "slide",
         "slopes",
         "stone_factor",
-        "swings",
         "tie_t",
         "two_surfaces",
         "zone",

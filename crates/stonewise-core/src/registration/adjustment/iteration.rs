@@ -72,9 +72,9 @@ impl<'a, S: PairSource> Run<'a, S> {
         self.adjustment.forget_swings();
     }
 
-    /// Gives up on stones that still move, see [`Adjustment::give_up_on_moving`].
-    pub fn give_up_on_moving(&mut self) -> bool {
-        self.adjustment.give_up_on_moving()
+    /// Returns true if most stones no longer move, see [`Adjustment::most_are_settled`].
+    pub fn most_are_settled(&self) -> bool {
+        self.adjustment.most_are_settled()
     }
 
     /// Parts the wall along its most significant crack, where it has one and fewer than `most`; whether it

@@ -221,7 +221,7 @@ fn failure(adjustment: &Adjustment, i: usize) -> Option<MotionFailure> {
     if e.overlap < params.min_overlap || disagrees {
         return Some(MotionFailure::Disagreement);
     }
-    stone.swings.then_some(MotionFailure::NotConverged)
+    stone.moves.then_some(MotionFailure::NotConverged)
 }
 
 /// Whether more than a share of a stone's cells shows two surfaces; `inflation`: factor on the expected

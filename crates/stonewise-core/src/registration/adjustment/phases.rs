@@ -129,7 +129,7 @@ impl<'a, S: PairSource> Weighed<'a, S> {
                 return Ok(Settled { run, converged: true });
             }
         }
-        let converged = is_begun && run.give_up_on_moving();
+        let converged = is_begun && run.most_are_settled();
         Ok(Settled { run, converged })
     }
 }

@@ -40,8 +40,6 @@ pub(crate) struct StoneState {
     pub decides: bool,
     /// Whether its last step exceeded a tenth of the uncertainty of its motion.
     pub moves: bool,
-    /// Whether its last step exceeded the uncertainty of its motion.
-    pub swings: bool,
     /// Effective degrees of freedom: how many unknowns the stone's own points determine.
     pub effective_freedom: f64,
 }
@@ -107,7 +105,6 @@ impl StoneState {
             p_with_field: 1.0,
             decides: true,
             moves: false,
-            swings: false,
             effective_freedom: 0.0,
         }
     }
