@@ -2,7 +2,7 @@
 
 use super::candidate::{CandidateMotion, Moving};
 use super::error::AdjustError;
-use super::field::{LEAST_APPEARANCE_M, START_APPEARANCE_M, posterior};
+use super::field::{LEAST_APPEARANCE_M, Prediction, START_APPEARANCE_M, posterior};
 use super::observation::NormalEquations;
 use super::observation::photo::{
     CloudMotion, FaceShift, PhotoModel, PhotoReport, StoneInPhotos, StonePhotos,
