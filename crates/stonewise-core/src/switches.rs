@@ -33,7 +33,7 @@ mod lab {
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// Names of all mechanisms that can be switched off.
-    pub const SWITCHES: [&str; 21] = [
+    pub const SWITCHES: [&str; 20] = [
         "across",
         "correlation",
         "covered",
@@ -46,7 +46,6 @@ mod lab {
         "obs_widened",
         "octaves_shown",
         "probe",
-        "room",
         "sensors",
         "shared",
         "slide",

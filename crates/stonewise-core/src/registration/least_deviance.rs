@@ -59,7 +59,10 @@ pub(super) fn least_deviance<const N: usize>(
             false => 0.0,
         });
         let tried = STEP_SHARES.map(|share| clamp(std::array::from_fn(|k| log[k] + share * step[k])));
-        let best = all(&tried).into_iter().zip(tried).min_by(|a, b| a.0.total_cmp(&b.0));
+        let best = all(&tried)
+            .into_iter()
+            .zip(tried)
+            .min_by(|a, b| a.0.total_cmp(&b.0));
         match best.filter(|(least, _)| *least <= values[0] - LEAST_GAIN) {
             Some((_, best)) => log = best,
             None => break,

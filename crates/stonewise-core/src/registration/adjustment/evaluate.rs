@@ -4,9 +4,7 @@ use super::candidate::CandidateMotion;
 use super::covered::covered;
 use super::error::AdjustError;
 use super::hypothesis::{LikelihoodRatioTest, Placed, Probe};
-use super::observation::surface::{
-    Correlation, Effort, Equations, LocalPair, estimate_noise,
-};
+use super::observation::surface::{Correlation, Effort, Equations, LocalPair, estimate_noise};
 use super::state::{Adjustment, StoneState};
 use super::stone_vector::StoneVector;
 use super::survey::Points;

@@ -72,6 +72,12 @@ mod tests {
             adjustment.put(i, StoneVector::from_translation(frame * moved));
         }
         assert!((adjustment.displacement(20) - far).norm() < 1e-12);
-        assert!(adjustment.surroundings().iter().flatten().all(|moved| moved.norm() < 1e-12));
+        assert!(
+            adjustment
+                .surroundings()
+                .iter()
+                .flatten()
+                .all(|moved| moved.norm() < 1e-12)
+        );
     }
 }

@@ -295,7 +295,10 @@ fn matching_errs_in_depth_as_the_base_says() {
     let found = network.matching(&[stone]).unwrap();
     // Two photos give the parallax, and two epochs the difference.
     let depth_m = 0.0125 * 0.06 * 2.0;
-    assert!((found.covariances[0][(0, 0)].sqrt() / depth_m - 1.0).abs() < 0.02, "{found:?}");
+    assert!(
+        (found.covariances[0][(0, 0)].sqrt() / depth_m - 1.0).abs() < 0.02,
+        "{found:?}"
+    );
     assert!((found.length_m - 110.0 * 5.0 / 2000.0).abs() < 1e-3, "{found:?}");
     let none = PhotoNetwork {
         photos: [Vec::new(), Vec::new()],
