@@ -40,7 +40,7 @@ impl Matching {
 
 impl PhotoNetwork {
     /// The errors of matching of the stones; `None` where no photos see one.
-    pub fn matching(&self, stones: &[SeenStone]) -> Option<Matching> {
+    pub(crate) fn matching(&self, stones: &[SeenStone]) -> Option<Matching> {
         let seen = self.sights(stones);
         let first_later = self.photos[0].len();
         let of_stone = |sights: &Vec<Sight>| {

@@ -287,12 +287,12 @@ fn matching_errs_in_depth_as_the_base_says() {
         is_joint: true,
         shifts: Vec::new(),
     };
-    let stone = SeenStone {
-        centroid: Point3::new(0.0, 0.0, 1.0),
+    let stone = |k: u32| SeenStone {
+        centroid: Point3::new(0.0, 0.01 * f64::from(k), 1.0),
         normal: Vector3::x(),
         sights: Vec::new(),
     };
-    let found = network.matching(&[stone]).unwrap();
+    let found = network.matching(&(0..8).map(stone).collect::<Vec<_>>()).unwrap();
     // Two photos give the parallax, and two epochs the difference.
     let depth_m = 0.0125 * 0.06 * 2.0;
     assert!(
