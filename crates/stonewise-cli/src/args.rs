@@ -641,8 +641,8 @@ pub enum ExperimentCommand {
     /// Split one epoch into halves, move the second, and reproduce Table 1, Table 2 and figures 5 to 9 of the
     /// paper.
     #[command(
-        after_help = "Examples:\n  stonewise experiment paper --size 10x5 --out paper/       # simulates a section first\n  \
-        stonewise experiment paper TLS=survey/stonewise.toml UAV=survey/stonewise_uav.toml --out paper/"
+        after_help = "Examples:\n  stonewise test experiment paper --size 10x5 --out paper/  # simulates a section first\n  \
+        stonewise test experiment paper TLS=survey/stonewise.toml UAV=survey/stonewise_uav.toml --out paper/"
     )]
     Paper(PaperArgs),
 }

@@ -270,7 +270,7 @@ static ENGLISH: Texts = Texts {
             "{n} stones or joints may have reached the attention threshold of {t}: their intervals extend to it",
         ],
         below: [
-            "the {n} measured stone did not reach the attention threshold of {t}",
+            "the {n} measured stone does not reach the attention threshold of {t}",
             "none of the {n} measured stones reaches the attention threshold of {t}",
         ],
         below_with_joints: [
@@ -343,7 +343,7 @@ static ENGLISH: Texts = Texts {
         no_thresholds: "No thresholds are set: any motion that is shown calls for attention.",
         look_first: "What to look at first",
         nothing_first: "No stone calls for a closer look.",
-        look_at_doubt: "At what puts the results in doubt. Until that is mended, no stone can be named.",
+        look_at_doubt: "What puts the results in doubt. Until that is mended, no stone can be named.",
         none_stands_out: "No stone stands out; that does not mean that none moved.",
         stone: "Stone",
         along_up: "{along} m along, {up} m up",
@@ -398,8 +398,8 @@ static ENGLISH: Texts = Texts {
         map_zones: " Dark outlines: areas that changed their shape.",
         section_title: "Stone {id} before and after",
         section_note: [
-            "Points of both epochs in a level section through its middle, seen from above",
-            "Points of both epochs in an upright section through its middle, seen from the side",
+            "Points of both epochs in a horizontal section through its middle, seen from above",
+            "Points of both epochs in a vertical section through its middle, seen from the side",
         ],
         section_place: "from the middle of the stone (m)",
         section_out: "out of the wall (mm)",

@@ -18,12 +18,12 @@ messages! {
 
         CAUSE_FIT:
             "Photos find {found} of the {sought} stones that they should show where clouds and cameras put them, so cameras and clouds fit \
-            each other; masks that are no stones, or surfaces that changed, are more likely",
+            each other; masks of things other than stones, or surfaces that changed, are more likely",
             "Die Fotos finden {found} der {sought} Steine, die sie zeigen müssten, dort, wo Punktwolken und Kameras sie vermuten lassen; Kameras \
             und Punktwolken passen also zueinander. Wahrscheinlicher sind Masken, die keine Steine sind, oder veränderte Oberflächen";
 
         CAUSE_OPEN:
-            "Either the epochs' clouds do not fit each other or their masks, or the masks show something else than stones: without \
+            "Either the epochs' clouds do not fit each other or their masks, or the masks show something other than stones: without \
             photos this cannot be decided",
             "Entweder passen die Punktwolken der Epochen nicht zueinander oder nicht zu ihren Masken, oder die Masken zeigen etwas anderes \
             als Steine: ohne Fotos lässt sich das nicht entscheiden";
@@ -48,7 +48,7 @@ messages! {
 
         TORN = "votes-disagree":
             "the photos disagree on where the stones are: a typical stone gets only {share} % of the photos' votes on its points, and one \
-            that the most photos show {best} %. Stones are therefore cut out of the cloud beside their place, and their motions must not \
+            in the most photos gets {best} %. Stones are therefore cut out of the cloud beside their place, and their motions must not \
             be relied on. {cause}",
             "die Fotos stimmen nicht darin überein, wo die Steine liegen: ein typischer Stein erhält nur {share} % der Stimmen der \
             Fotos zu seinen Punkten, einer, den die meisten Fotos zeigen, {best} %. Steine sind also neben ihrem Platz aus der Wolke \
@@ -99,7 +99,7 @@ messages! {
 
         TURNED = "turned-epoch":
             "this epoch is turned by {angle} degrees against the first as a whole. Motions are computed for small rotations: here they \
-            are wrong by up to {error} mm, and standard deviations of {sd} mm do not contain that",
+            are wrong by up to {error} mm, which standard deviations of {sd} mm do not contain",
             "diese Epoche ist als Ganzes um {angle} Grad gegen die erste gedreht. Bewegungen werden für kleine Drehungen berechnet: hier \
             sind sie um bis zu {error} mm falsch, was Standardabweichungen von {sd} mm nicht enthalten";
     }
