@@ -213,7 +213,7 @@ pub enum TestCommand {
     /// Split one survey into two halves, to put a known motion into one of them
     #[command(after_help = "Example:\n  stonewise test split survey/stonewise.toml --seed 1 --out halves/")]
     Split(SplitArgs),
-    /// Certify this program on this machine, on simulated walls and own scans
+    /// Certify this program on this machine, on simulated walls and your own scans
     #[command(after_help = "Examples:\n  stonewise test certify --out certificate/\n  \
         stonewise test certify survey/stonewise.toml --seed 7 --out certificate/\n\n\
         The figures go to stdout. Exit code 3 if one is outside what is allowed.")]
@@ -406,13 +406,13 @@ pub struct EditsImportArgs {
     /// Epoch of the photos of a COCO file (default: the first).
     #[arg(long, value_name = "NAME")]
     pub epoch: Option<String>,
-    /// Who decided; an attribute of that name in the file comes before it.
+    /// Who decided; an attribute of that name in the file takes precedence.
     #[arg(long)]
     pub who: String,
-    /// Why; an attribute of that name in the file comes before it.
+    /// Why; an attribute of that name in the file takes precedence.
     #[arg(long)]
     pub why: String,
-    /// When, YYYY-MM-DD (default: today); an attribute of that name in the file comes before it.
+    /// When, YYYY-MM-DD (default: today); an attribute of that name in the file takes precedence.
     #[arg(long, value_name = "DATE")]
     pub when: Option<String>,
 }
@@ -576,7 +576,7 @@ pub struct ReportArgs {
     /// Leave parameters, digests and decisions about masks out of the PDF.
     #[arg(long, requires = "pdf")]
     pub no_appendix: bool,
-    /// Print the part of the yearly safety report on measurements instead; of more than two epochs.
+    /// Print the part of the yearly safety report on measurements instead; needs three epochs or more.
     #[arg(long, requires = "pdf", conflicts_with = "no_appendix")]
     pub yearly: bool,
 }
