@@ -59,9 +59,9 @@ messages! {
                 each cloud only once",
             "{share} % der Punkte sind doppelt vorhanden und würden doppelt zählen; die Intervalle der Bewegungen wären dann zu klein: \
              jede Punktwolke nur einmal angeben";
-        LIES_FLAT = "lies-flat": "nearly all surfaces lie flat, and only {share} % of the points are on steep ones, as of a wall. If the wall lies on its back, \
+        LIES_FLAT = "lies-flat": "nearly all surfaces lie flat, and only {share} % of the points are on steep ones; a wall is upright. If it lies on its back, \
                     Y points up in the cloud: export it with Z up, cameras included",
-            "fast alle Flächen liegen waagrecht, nur {share} % der Punkte auf steilen wie denen einer Mauer. Liegt die Mauer auf dem Rücken, zeigt in der \
+            "fast alle Flächen liegen waagrecht, nur {share} % der Punkte auf steilen; eine Mauer steht aufrecht. Liegt sie auf dem Rücken, zeigt in der \
              Punktwolke Y nach oben: sie mit Z nach oben ausgeben, samt den Kameras";
         NORTH_FIRST = "axis-order": "X is where northings are and Y where eastings are: if X points north, as for German surveyors, exchange both, or the wall \
                       is mirrored",

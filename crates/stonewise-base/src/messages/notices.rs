@@ -58,7 +58,7 @@ messages! {
 
         SIZE_OF_STONES:
             "nine tenths of the stones found in a first look are larger than {size} m",
-            "neun Zehntel der auf den ersten Blick gefundenen Steine sind größer als {size} m";
+            "neun Zehntel der bei einem ersten Blick gefundenen Steine sind größer als {size} m";
 
         SIZE_UNKNOWN:
             "a first look shows too few stones to tell how large they are",
