@@ -117,11 +117,14 @@ pub fn registration_record() -> RegistrationRecord {
         deformation: None,
         checks: vec![CheckRecord {
             name: "insensitive".to_owned(),
+            what: "smallest motion that would be detected, against what the points allow".to_owned(),
+            epoch: "2025".to_owned(),
             statistic: 1.25,
             limit: 100.0,
-            source: "what the points allow".to_owned(),
-            remedy: "look at the masks".to_owned(),
+            at_least: false,
+            source: "chosen".to_owned(),
             passed: true,
+            remedy: None,
         }],
     }
 }

@@ -15,16 +15,17 @@ EARLIEST = (1980, 1, 1, 0, 0, 0)
 
 def pack(folder: Path) -> Path:
     version = re.search(r'^\[workspace\.package\][^\[]*?^version = "(.+?)"', (ROOT / "Cargo.toml").read_text(), re.M | re.S)[1]
-    files = sorted(Path(__file__).with_name("stonewise").glob("*.*")) + [ROOT / name for name in ("LICENSE-MIT", "LICENSE-APACHE")]
+    files = {file.name: file.read_bytes() for file in sorted(Path(__file__).with_name("stonewise").glob("*.*"))}
+    files["metadata.txt"] = files["metadata.txt"].replace(b"version=VERSION", f"version={version}".encode())
+    # The plugins' site asks for one file of this name.
+    files["LICENSE"] = b"\nor, at your option,\n\n".join((ROOT / name).read_bytes() for name in ("LICENSE-MIT", "LICENSE-APACHE"))
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"stonewise-qgis-{version}.zip"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        for file in files:
-            text = file.read_text(encoding="utf-8")
-            text = text.replace("version=VERSION", f"version={version}") if file.name == "metadata.txt" else text
-            entry = zipfile.ZipInfo(f"stonewise/{file.name}", EARLIEST)
+        for name, content in files.items():
+            entry = zipfile.ZipInfo(f"stonewise/{name}", EARLIEST)
             entry.external_attr = 0o644 << 16
-            archive.writestr(entry, text, zipfile.ZIP_DEFLATED)
+            archive.writestr(entry, content, zipfile.ZIP_DEFLATED)
     return path
 
 

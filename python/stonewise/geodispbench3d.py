@@ -1,7 +1,7 @@
 """stonewise as a tool of geodispbench3d, which compares programs on known displacements of points.
 
-``docs/src/geodispbench3d.md`` has the files of a suite. A prediction is the motion of the stone nearest to a point; the interval that
-belongs to it goes along, so that :func:`interval_coverage` can be counted beside the benchmark's own metrics, which need none.
+``integrations/geodispbench3d/README.md`` has the files of a suite. A prediction is the motion of the stone nearest to a
+point; the interval that belongs to it goes along, so that :func:`interval_coverage` can be counted beside the benchmark's own metrics, which need none.
 """
 
 from __future__ import annotations

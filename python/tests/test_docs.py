@@ -17,6 +17,7 @@ import pytest
 import stonewise
 
 PAGE = Path(__file__).parents[2] / "docs" / "src" / "python.md"
+EXAMPLES, RECIPES = PAGE.read_text().split("## In other programs\n")
 
 
 @pytest.mark.parametrize("name", [m.name for m in pkgutil.iter_modules(stonewise.__path__) if m.name not in ("_native", "__main__")])
@@ -40,15 +41,12 @@ def test_the_page(survey, tmp_path, monkeypatch):
     (tmp_path / "survey").symlink_to(survey)
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    examples = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.DOTALL | re.MULTILINE)
+    examples = re.findall(r"^```python\n(.*?)^```", EXAMPLES, re.DOTALL | re.MULTILINE)
     assert len(examples) >= 5
     for example in examples:
         exec(compile(example, str(PAGE), "exec"), names)
     assert os.path.isfile("results/data/stones.parquet")
     assert (names["stones"][0] > 0).any()
-
-
-RECIPES = PAGE.with_name("recipes.md").read_text()
 
 
 @pytest.mark.parametrize("recipe", re.findall(r"^```python\n(.*?)^```", RECIPES, re.DOTALL | re.MULTILINE))
@@ -60,7 +58,7 @@ def test_recipes(recipe, results, tmp_path, monkeypatch):
     (tmp_path / "results").symlink_to(Path(results.report).parents[1])
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    exec(compile(recipe, "recipes.md", "exec"), names)
+    exec(compile(recipe, str(PAGE), "exec"), names)
     assert "axes" not in names or os.path.getsize("stones.png") > 5_000
     # The stones that moved farthest, as the table's own columns say.
     if "farthest" in names:

@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("geodispbench3d")
 
-PAGE = Path(__file__).parents[2] / "docs" / "src" / "geodispbench3d.md"
+PAGE = Path(__file__).parents[2] / "integrations" / "geodispbench3d" / "README.md"
 
 
 @pytest.fixture

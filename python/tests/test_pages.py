@@ -10,7 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PAGES = [
     *ROOT.glob("*.md"),
-    *(page for folder in ("docs", "lab", "testdata") for page in ROOT.glob(f"{folder}/**/*.md")),
+    *(page for folder in ("docs", "integrations", "lab", "testdata") for page in ROOT.glob(f"{folder}/**/*.md")),
 ]
 
 

@@ -345,7 +345,7 @@ def realitycapture():
     angled = "#cameras 4\n#name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2\n"
     plain = ("#name,tx,ty,tz,R00,R01,R02,R10,R11,R12,R20,R21,R22,f_pix,px_pix,py_pix,k1,k2,t2,t1,k3,k4 (R = [Rij], row by row, "
              "and t = (tx,ty,tz) are the pose)\n")
-    expected, sidecars = {}, {}
+    expected = {}
     for i, (name, model, width, height, k4, tangential) in enumerate([
             ("none.jpg", "perspective", 400, 300, 0, [0, 0]), ("wing/brown3, b.jpg", "brown3", 300, 400, 0, [0, 0]),
             ("brown3t2.jpg", "brown3t2", 400, 300, 0, P), ("wing/brown4t2.jpg", "brown4t2", 300, 400, 0.0047, P)]):

@@ -53,8 +53,6 @@ export interface ReportDocument {
     readonly rotation: number;
     readonly opening: number;
   };
-  /** Decimals that a millimetre of these motions is worth. */
-  readonly decimals: number;
   /** Whether the results as a whole can be relied on. If not, it is unknown which stones moved or are loose, and there are no limits and intervals. */
   readonly sound: boolean;
   /** Whether uncertainties hold the error of the registration of the epochs. */

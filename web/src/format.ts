@@ -11,11 +11,6 @@ export function fixed(value: number, decimals: number): string {
   return sign + text.replace(".", DECIMAL);
 }
 
-/** A number with a fixed number of decimals, and a plus sign before positive values. */
-export function signed(value: number, decimals: number): string {
-  return value > 0 && Number(value.toFixed(decimals)) !== 0 ? `+${fixed(value, decimals)}` : fixed(value, decimals);
-}
-
 /** Metres as millimetres with one decimal, from 100 mm on without, below 1 mm with two. */
 export function mm(metres: number): string {
   const value = metres * 1e3;

@@ -85,7 +85,7 @@ pub enum Command {
     /// Work on a page in the browser: look, run, correct, read the report
     #[command(
         after_help = "Examples:\n  stonewise studio survey/\n  stonewise studio results/ --view\n\n\
-        The address goes to stdout; only this machine can reach it. See docs/src/studio.md."
+        The address goes to stdout; only this machine can reach it. See docs/src/edits.md."
     )]
     Studio(StudioArgs),
     /// Write the report of a finished run again, or print it as PDF
@@ -213,7 +213,7 @@ pub enum TestCommand {
     /// Split one survey into two halves, to put a known motion into one of them
     #[command(after_help = "Example:\n  stonewise test split survey/stonewise.toml --seed 1 --out halves/")]
     Split(SplitArgs),
-    /// Certify this program on this machine, on simulated walls and own scans
+    /// Certify this program on this machine, on simulated walls and your own scans
     #[command(after_help = "Examples:\n  stonewise test certify --out certificate/\n  \
         stonewise test certify survey/stonewise.toml --seed 7 --out certificate/\n\n\
         The figures go to stdout. Exit code 3 if one is outside what is allowed.")]
@@ -406,13 +406,13 @@ pub struct EditsImportArgs {
     /// Epoch of the photos of a COCO file (default: the first).
     #[arg(long, value_name = "NAME")]
     pub epoch: Option<String>,
-    /// Who decided; an attribute of that name in the file comes before it.
+    /// Who decided; an attribute of that name in the file takes precedence.
     #[arg(long)]
     pub who: String,
-    /// Why; an attribute of that name in the file comes before it.
+    /// Why; an attribute of that name in the file takes precedence.
     #[arg(long)]
     pub why: String,
-    /// When, YYYY-MM-DD (default: today); an attribute of that name in the file comes before it.
+    /// When, YYYY-MM-DD (default: today); an attribute of that name in the file takes precedence.
     #[arg(long, value_name = "DATE")]
     pub when: Option<String>,
 }
@@ -576,7 +576,7 @@ pub struct ReportArgs {
     /// Leave parameters, digests and decisions about masks out of the PDF.
     #[arg(long, requires = "pdf")]
     pub no_appendix: bool,
-    /// Print the part of the yearly safety report on measurements instead; of more than two epochs.
+    /// Print the part of the yearly safety report on measurements instead; needs three epochs or more.
     #[arg(long, requires = "pdf", conflicts_with = "no_appendix")]
     pub yearly: bool,
 }
@@ -641,8 +641,8 @@ pub enum ExperimentCommand {
     /// Split one epoch into halves, move the second, and reproduce Table 1, Table 2 and figures 5 to 9 of the
     /// paper.
     #[command(
-        after_help = "Examples:\n  stonewise experiment paper --size 10x5 --out paper/       # simulates a section first\n  \
-        stonewise experiment paper TLS=survey/stonewise.toml UAV=survey/stonewise_uav.toml --out paper/"
+        after_help = "Examples:\n  stonewise test experiment paper --size 10x5 --out paper/  # simulates a section first\n  \
+        stonewise test experiment paper TLS=survey/stonewise.toml UAV=survey/stonewise_uav.toml --out paper/"
     )]
     Paper(PaperArgs),
 }

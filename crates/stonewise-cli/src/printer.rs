@@ -2,7 +2,7 @@
 
 use crate::note::note;
 use crate::screen::Screen;
-use crate::steps::{Ended, Steps, wrapped};
+use crate::steps::{Ended, Steps, cut, wrapped};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
@@ -88,16 +88,29 @@ impl Printer {
 
     /// One line of the log.
     pub fn log(&self, line: &str) {
-        if self.quiet {
-            return;
+        if !self.quiet {
+            self.always(line);
         }
+    }
+
+    /// One line of the log, also with `--quiet`.
+    pub fn always(&self, line: &str) {
         match &self.shown().screen {
             Some(screen) => screen.above(|| {
-                let lines = wrapped(line, screen.width());
+                let lines = wrapped(line, screen.width(), 2);
                 lines.iter().for_each(|line| note(line));
             }),
             None => note(line),
         }
+    }
+
+    /// A remark, which takes one line of a terminal: as much as fits beside its code.
+    pub fn remark(&self, word: &str, text: &str, code: Option<&str>) {
+        let code = code.map_or(String::new(), |code| format!(" [{code}]"));
+        let text = format!("{word}: {text}");
+        let width = self.shown().screen.as_ref().map_or(usize::MAX, Screen::width);
+        let text = cut(&text, width.saturating_sub(code.chars().count()));
+        self.log(&format!("{text}{code}"));
     }
 
     /// The list of steps is at its end.

@@ -24,7 +24,7 @@ enum At {
 /// A step that has ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ended {
-    /// Its place in the list and its name, such as "9/14 adjustment of 2026-04".
+    /// Its place in the list and its name, such as "4/6 measure the motions".
     pub step: String,
     /// How long it took, seconds; `None` where it was done earlier.
     pub seconds: Option<f64>,
@@ -141,16 +141,15 @@ pub fn time_to_go(elapsed: f64, to_go: f64, done: u64, total: u64) -> String {
     }
 }
 
-/// A line in lines of at most `width` characters, broken between words; those after the first are indented by
-/// two.
-pub fn wrapped(line: &str, width: usize) -> Vec<String> {
+/// A line in lines of at most `width` characters, broken between words; those after the first are indented.
+pub fn wrapped(line: &str, width: usize, indent: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in line.split(' ') {
         let is_first = lines.len() == 1;
         let Some(last) = lines.last_mut() else { continue };
-        let is_fresh = last.is_empty() || (!is_first && last == "  ");
+        let is_fresh = last.is_empty() || (!is_first && last.trim().is_empty());
         if !is_fresh && last.chars().count() + 1 + word.chars().count() > width {
-            lines.push(format!("  {word}"));
+            lines.push(format!("{:indent$}{word}", ""));
         } else {
             if !is_fresh {
                 last.push(' ');
@@ -267,12 +266,14 @@ mod tests {
         let line =
             "note: epoch 2: areas off the wall are seen in both epochs and could show their registration";
         for width in [20, 33, 80, 200] {
-            let lines = wrapped(line, width);
+            let lines = wrapped(line, width, 2);
             assert!(lines.iter().all(|l| l.chars().count() <= width), "{lines:?}");
             let joined: Vec<&str> = lines.iter().map(|l| l.trim()).collect();
             assert_eq!(joined.join(" "), line);
         }
-        assert_eq!(wrapped("averyverylongword", 5), ["averyverylongword"]);
+        assert_eq!(wrapped("averyverylongword", 5, 2), ["averyverylongword"]);
+        let table = wrapped("all   masks  two words", 17, 13);
+        assert_eq!(table, ["all   masks  two", "             words"]);
         assert_eq!(cut("adjustment of 2026-04", 12), "adjustment\u{2026}");
     }
 }

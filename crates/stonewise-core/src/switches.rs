@@ -33,34 +33,26 @@ mod lab {
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// Names of all mechanisms that can be switched off.
-    pub const SWITCHES: [&str; 28] = [
+    pub const SWITCHES: [&str; 20] = [
         "across",
-        "bodies",
         "correlation",
         "covered",
         "crack",
         "foreign",
-        "halves",
         "obs_average",
         "obs_drift",
         "obs_gross",
         "obs_stretch",
         "obs_widened",
         "octaves_shown",
-        "partial",
         "probe",
-        "restart",
-        "room",
-        "roughness",
         "sensors",
         "shared",
         "slide",
         "slopes",
         "stone_factor",
-        "swings",
         "tie_t",
         "two_surfaces",
-        "widening",
         "zone",
     ];
 

@@ -197,7 +197,7 @@ impl Messenger {
 }
 
 impl Steps {
-    /// A task under the name of its step, such as "9/15 adjustment of 2026-04, iteration 3".
+    /// A task under the name of its step, such as "4/6 measure the motions, iteration 3".
     fn with_step(&self, what: &str) -> String {
         let step = self.present.and_then(|at| Some((at + 1, self.names.get(at)?)));
         step.map_or_else(

@@ -538,7 +538,7 @@ mod tests {
             "temperature 9.5\u{a0}\u{b0}C",
             "<a data-stone=\"15\">Stone 15</a>, 0.80\u{a0}m along, 0.50\u{a0}m up: moved 20.4\u{a0}mm",
             "4 of 24 stones were not measured",
-            "Detection limit: 1.4\u{a0}mm (median), 1.4\u{a0}mm (90th percentile)",
+            "<b>Detection limit: 1.4\u{a0}mm (median)</b>",
             "<p>Signature</p>",
             "src=\"data:image/png;base64,",
             // Two stones moved by 2 cm; the others are far below their limit of 1.4 mm.
@@ -555,7 +555,7 @@ mod tests {
         let html = settled(&[8, 15], &german);
         assert!(html.starts_with("<!DOCTYPE html>\n<html lang=\"de\">"));
         for words in [
-            "Achtung: 2 von 20 gemessenen Steinen haben sich bewegt",
+            "Aufmerksamkeit: 2 von 20 gemessenen Steinen haben sich bewegt",
             "Temperatur 9,5",
             "<p>Unterschrift</p>",
             "Nachweisgrenze: 1,4\u{a0}mm",

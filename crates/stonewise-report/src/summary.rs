@@ -98,20 +98,6 @@ impl<'a> Summary<'a> {
         Texts::of(self.cover.language)
     }
 
-    /// Decimals of a millimetre in tables: one, two where the typical detection limit is below 1 mm.
-    pub(crate) fn decimals(&self) -> usize {
-        if self.limits.median().is_some_and(|l| l < 1e-3) {
-            2
-        } else {
-            1
-        }
-    }
-
-    /// Millimetres for tables.
-    pub(crate) fn mm(&self, metres: f64) -> String {
-        self.texts().number(metres * 1e3, self.decimals())
-    }
-
     /// Number of stones without a motion.
     pub(crate) fn not_measured(&self) -> usize {
         self.stones - self.measured.len()

@@ -90,7 +90,7 @@ pub static STONE_COLUMNS: &[StoneColumn] = &[
     column!(Motion "sd_along", "m", "standard deviation of d_along, from the covariance of dx, dy, dz", face_sd.x),
     column!(Motion "sd_up", "m", "standard deviation of d_up", face_sd.y),
     column!(Motion "sd_out", "m", "standard deviation of d_out", face_sd.z),
-    column!(OptionalMotion "p_loose", "", "probability that the stone is loose, 0 to 1; 0.3 where one half of the stone's points contradicts the stone's own motion; empty where the estimator gives none", p_loose),
+    column!(OptionalMotion "p_loose", "", "probability that the stone is loose, 0 to 1; empty where the estimator gives none", p_loose),
     column!(Motion "cov_rot_xx", "rad2", "covariance of rx and rx", rotation_covariance.m11),
     column!(Motion "cov_rot_xy", "rad2", "covariance of rx and ry", rotation_covariance.m12),
     column!(Motion "cov_rot_xz", "rad2", "covariance of rx and rz", rotation_covariance.m13),

@@ -58,7 +58,7 @@ impl Weights {
     }
 }
 
-/// The bytes of the built-in weights file, see docs/src/method/built-in-weights.md.
+/// The bytes of the built-in weights file, see docs/src/method/segmentation.md.
 fn built_in() -> Vec<u8> {
     [stonewise_weights_1::PART, stonewise_weights_2::PART].concat()
 }

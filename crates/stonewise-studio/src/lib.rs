@@ -1,7 +1,7 @@
 //! The page to work in: a server on the loopback address, its JSON API, and what it keeps.
 //!
-//! The library does the work; the page is TypeScript in `web/studio`. docs/src/studio.md says what the page does and
-//! what is promised about its security.
+//! The library does the work; the page is TypeScript in `web/studio`. docs/src/edits.md says what the page does and
+//! who can use it.
 
 mod api;
 mod assets;

@@ -22,7 +22,7 @@ from qgis.core import (
     QgsVectorLayerSimpleLabeling,
 )
 from qgis.PyQt.QtCore import QTimer
-from qgis.PyQt.QtWidgets import QAction, QFileDialog, QInputDialog, QLabel, QLineEdit, QMessageBox
+from qgis.PyQt.QtWidgets import QFileDialog, QInputDialog, QLabel, QLineEdit, QMessageBox
 
 # Kinds of layers, the topmost first, and whether they are shown at once.
 KINDS = {"displacements": True, "zones": True, "joints": False, "stones": True}
@@ -47,7 +47,7 @@ class Plugin:
 
     def __init__(self, iface):
         self.iface = iface
-        self.actions: list[QAction] = []
+        self.actions = []
 
     def initGui(self):
         self.toolbar = self.iface.addToolBar("stonewise")
@@ -57,11 +57,10 @@ class Plugin:
             ("Correct stones", "Edit a copy of the stones", self.ask_correct),
             ("Send edits…", "Turn corrected stones into a file of edits", self.ask_send),
         ):
-            action = QAction(text, self.iface.mainWindow())
+            action = self.toolbar.addAction(text)
             action.setToolTip(tip)
             action.triggered.connect(lambda _=False, ask=ask: self.attempt(ask))
             self.iface.addPluginToMenu("stonewise", action)
-            self.toolbar.addAction(action)
             self.actions.append(action)
         self.number = QLineEdit()
         self.number.setPlaceholderText("number")

@@ -1,8 +1,7 @@
 //! Scores a detector on rendered walls whose seeds are kept apart: `kept-walls [FIRST_SEED COUNT [WEIGHTS
 //! [CLOUD [MIN_SCORE [dry]]]]]`, CLOUD: none, terrestrial, drone or stereo; dry: the same walls laid dry.
-//! Prints a table by size of the stones, light and contrast of the joints, for
-//! docs/src/method/segmentation.md, and on standard error the counts and the sum of IoU of each wall, by which two detectors can
-//! be compared wall by wall.
+//! Prints a table by size of the stones, light and contrast of the joints, for docs/src/accuracy.md, and on standard
+//! error the counts and the sum of IoU of each wall, by which two detectors can be compared wall by wall.
 //!
 //! Whoever chooses thresholds, tiles or training by these walls makes them development walls: take other
 //! seeds then, and say so.

@@ -2,7 +2,7 @@
 
 import { type Report, isMeasured, norm } from "../data.ts";
 import { button, el } from "../dom.ts";
-import { count, fixed, percent, signed } from "../format.ts";
+import { count, fixed, mm, percent, signedMm } from "../format.ts";
 import type { Store } from "../store.ts";
 import { t } from "../texts.ts";
 
@@ -21,10 +21,9 @@ const FILTERS_IN_DOUBT = ["filterAll", "unmeasured"] as const;
 
 /** The folded list under the map. */
 export function stoneList(report: Report, store: Store): HTMLElement {
-  const { stones, document: { statuses, decimals, sound } } = report;
-  const mm = (metres: number) => fixed(metres * 1e3, decimals);
+  const { stones, document: { statuses, sound } } = report;
   const move = (title: string, axis: 0 | 1 | 2): Column => ({
-    title, value: (i) => stones.move[axis][i]!, text: (i) => signed(stones.move[axis][i]! * 1e3, decimals),
+    title, value: (i) => stones.move[axis][i]!, text: (i) => signedMm(stones.move[axis][i]!),
   });
   const limit: Column = { title: t("columnLimit"), value: (i) => stones.limit[i]!, text: (i) => mm(stones.limit[i]!) };
   const columns: readonly Column[] = [

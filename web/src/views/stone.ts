@@ -2,7 +2,7 @@
 
 import { type Report, type Stones, covariance, isMeasured, norm } from "../data.ts";
 import { button, el, svg } from "../dom.ts";
-import { count, DASH, fixed, mm, percent, signed, signedMm } from "../format.ts";
+import { count, DASH, fixed, mm, percent, signedMm } from "../format.ts";
 import { eigen3, ellipse } from "../geometry.ts";
 import type { Store } from "../store.ts";
 import { t } from "../texts.ts";
@@ -115,8 +115,7 @@ export class StonePanel {
   }
 
   #numbers(stone: number): Node {
-    const { stones, document: { decimals, registrationKnown, sound } } = this.#report;
-    const mm = (metres: number) => fixed(metres * 1e3, decimals), signedMm = (metres: number) => signed(metres * 1e3, decimals);
+    const { stones, document: { registrationKnown, sound } } = this.#report;
     const cell = (text: string) => el("td", { class: "n" }, text);
     // Of a run in doubt neither intervals nor limits are given.
     const sure = (text: string) => (sound ? cell(text) : null);
@@ -137,8 +136,8 @@ export class StonePanel {
 
   /** Where the standard deviations come from, the largest share first. */
   #budget(stone: number): Node | null {
-    const { stones, document: { terms, decimals } } = this.#report;
-    const sd = (metres: number) => el("td", { class: "n" }, fixed(metres * 1e3, decimals + 1));
+    const { stones, document: { terms } } = this.#report;
+    const sd = (metres: number) => el("td", { class: "n" }, mm(metres));
     const total = stones.sigma.reduce((sum, v) => sum + v[stone]! ** 2, 0);
     const square = (n: number) => stones.budget[n]!.reduce((sum, v) => sum + v[stone]! ** 2, 0);
     const shown = terms.map((_, n) => n).filter((n) => square(n) > 0).sort((a, b) => square(b) - square(a));

@@ -18,12 +18,12 @@ messages! {
 
         CAUSE_FIT:
             "Photos find {found} of the {sought} stones that they should show where clouds and cameras put them, so cameras and clouds fit \
-            each other; masks that are no stones, or surfaces that changed, are more likely",
+            each other; masks of things other than stones, or surfaces that changed, are more likely",
             "Die Fotos finden {found} der {sought} Steine, die sie zeigen müssten, dort, wo Punktwolken und Kameras sie vermuten lassen; Kameras \
             und Punktwolken passen also zueinander. Wahrscheinlicher sind Masken, die keine Steine sind, oder veränderte Oberflächen";
 
         CAUSE_OPEN:
-            "Either the epochs' clouds do not fit each other or their masks, or the masks show something else than stones: without \
+            "Either the epochs' clouds do not fit each other or their masks, or the masks show something other than stones: without \
             photos this cannot be decided",
             "Entweder passen die Punktwolken der Epochen nicht zueinander oder nicht zu ihren Masken, oder die Masken zeigen etwas anderes \
             als Steine: ohne Fotos lässt sich das nicht entscheiden";
@@ -36,25 +36,19 @@ messages! {
             Bewegungen aus der Ebene können das falsche Vorzeichen haben. Die Ansichten im Bericht ansehen: ist die Mauer von hinten zu \
             sehen, einen Punkt vor ihr angeben, `[views] outside = [x, y, z]`, oder Punktwolken, die den Boden vor der Mauer zeigen";
 
-        BESIDE_COMPARED = "cloud-off-photos":
-            "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, compared with epoch {first}, \
-            so stones are cut out of the cloud beside their place, and their motions must not be relied on. Bring cameras and \
-            clouds into one frame; `stonewise check` shows the edges of the cloud over a photo",
-            "die Punktwolke liegt, verglichen mit der Epoche {first}, {length} mm ({along} längs, {up} hoch) neben den Steinen, die \
-            die Fotos zeigen; Steine sind also neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen ist kein Verlass. \
-            Kameras und Punktwolken in ein System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
-
         BESIDE = "cloud-off-photos":
-            "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, so stones are cut out of the \
-            cloud beside their place, and their motions must not be relied on. Bring cameras and clouds into one frame; \
-            `stonewise check` shows the edges of the cloud over a photo",
-            "die Punktwolke liegt {length} mm ({along} längs, {up} hoch) neben den Steinen, die die Fotos zeigen; Steine sind also \
-            neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen ist kein Verlass. Kameras und Punktwolken in ein \
-            System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
+            "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show{compared}, so stones are cut out \
+            of the cloud beside their place, and their motions must not be relied on",
+            "die Punktwolke liegt {length} mm ({along} längs, {up} hoch) neben den Steinen, die die Fotos zeigen{compared}; Steine sind \
+            also neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen ist kein Verlass";
+
+        COMPARED:
+            ", compared with epoch {first}",
+            ", verglichen mit der Epoche {first}";
 
         TORN = "votes-disagree":
             "the photos disagree on where the stones are: a typical stone gets only {share} % of the photos' votes on its points, and one \
-            that the most photos show {best} %. Stones are therefore cut out of the cloud beside their place, and their motions must not \
+            in the most photos gets {best} %. Stones are therefore cut out of the cloud beside their place, and their motions must not \
             be relied on. {cause}",
             "die Fotos stimmen nicht darin überein, wo die Steine liegen: ein typischer Stein erhält nur {share} % der Stimmen der \
             Fotos zu seinen Punkten, einer, den die meisten Fotos zeigen, {best} %. Steine sind also neben ihrem Platz aus der Wolke \
@@ -63,13 +57,10 @@ messages! {
         MISREGISTERED_EPOCH = "misregistered-epoch":
             "{cells} pieces of plane surfaces off the wall appear shifted by ({shown}) mm (x, y, z) against the first epoch. The stations \
             and strips alone give a shift of ({found}) mm with a standard deviation of {sd} mm. If these surfaces did not move, all \
-            motions are wrong by the difference: set auto_stable = true to use the surfaces, or name some of them under \
-            [[registration.stable]]. If they did move, state the registration error as epoch_error_m",
+            motions are wrong by the difference",
             "{cells} ebene Flächenstücke neben der Mauer erscheinen gegenüber der ersten Epoche um ({shown}) mm (x, y, z) verschoben. Aus \
             den Standpunkten und Streifen allein folgt eine Verschiebung von ({found}) mm mit einer Standardabweichung von {sd} mm. \
-            Haben sich diese Flächen nicht bewegt, so sind alle Bewegungen um den Unterschied falsch: die Flächen mit auto_stable = true \
-            verwenden oder einige davon unter [[registration.stable]] angeben. Haben sie sich bewegt, den Registrierungsfehler als \
-            epoch_error_m angeben";
+            Haben sich diese Flächen nicht bewegt, so sind alle Bewegungen um den Unterschied falsch";
 
         FEW_MEASURED = "few-measured":
             "only {measured} of the {matched} stones found in both epochs could be measured ({reasons}). That no motion is shown for \
@@ -79,21 +70,18 @@ messages! {
 
         UNCOVERED = "uncovered-wall":
             "the {measured} measured stones cover {area} m2 of the {walls} m2 of walls that the clouds show around them: nothing is \
-            known of the rest. Look at the views in the report: if the wall is seen from behind, give a point in front of it, \
-            `[views] outside = [x, y, z]`; if its stones do not show, give photos, or clouds with more points",
+            known of the rest",
             "die {measured} gemessenen Steine bedecken {area} m2 der {walls} m2 Mauern, die die Punktwolken um sie herum zeigen: über \
-            den Rest ist nichts bekannt. Die Ansichten im Bericht ansehen: ist die Mauer von hinten zu sehen, einen Punkt vor ihr angeben, \
-            `[views] outside = [x, y, z]`; sind ihre Steine nicht zu erkennen, Fotos angeben oder Punktwolken mit mehr Punkten";
+            den Rest ist nichts bekannt";
 
         PART_REFUSED = "part-in-disagreement":
             "{stones} neighbouring stones of a part of the wall, around stone {stone}, have no motion: the clouds of the two epochs show \
             different surfaces there, or a motion unlike that of the rest which nothing confirms. Something covers the part (plants, snow, a \
-            banner), it moved, or its clouds or masks mislead. Its motion is unknown. Look at the part on site \
-            and in the clouds of both epochs",
+            banner), it moved, or its clouds or masks mislead. Its motion is unknown",
             "{stones} benachbarte Steine eines Teils der Mauer um Stein {stone} haben keine Bewegung: die Punktwolken der beiden Epochen zeigen \
             dort verschiedene Oberflächen, oder eine Bewegung anders als die der übrigen Mauer, die nichts bestätigt. Etwas bedeckt den Teil \
             (Pflanzen, Schnee, ein Banner), er hat sich bewegt, oder seine Punktwolken oder Masken täuschen. Seine Bewegung ist \
-            unbekannt. Den Teil vor Ort und in den Punktwolken beider Epochen ansehen";
+            unbekannt";
 
         BLIND = "insensitive":
             "motions below about {limit} mm cannot be detected in the weakest direction, {excess} times what the spacing and the noise \
@@ -104,19 +92,15 @@ messages! {
         STRETCHED = "wrong-scale":
             "the wall changed its size by {strain} +- {half_width} mm per metre, and by {lesser} mm per metre in the direction that \
             changed least. Temperature explains 0.3 mm per metre, so the cloud of one epoch may have a wrong scale: the common \
-            stretch counts as an error, not as a motion. A known length in each epoch decides it: name it in [[distances]]. Check the \
-            scale of scanner and photogrammetric block, and the map projection with its scale factor",
+            stretch counts as an error, not as a motion",
             "die Mauer hat ihre Größe um {strain} +- {half_width} mm je Meter geändert, in der Richtung der kleinsten Änderung um \
             {lesser} mm je Meter. Temperatur erklärt 0,3 mm je Meter; die Punktwolke einer Epoche kann also einen falschen Maßstab \
-            haben: die gemeinsame Dehnung gilt als Fehler, nicht als Bewegung. Eine bekannte Länge in jeder Epoche entscheidet es: sie \
-            gehört in [[distances]]. Den Maßstab von Scanner und Bildverband und die Kartenprojektion mit ihrem Maßstabsfaktor prüfen";
+            haben: die gemeinsame Dehnung gilt als Fehler, nicht als Bewegung";
 
         TURNED = "turned-epoch":
             "this epoch is turned by {angle} degrees against the first as a whole. Motions are computed for small rotations: here they \
-            are wrong by up to {error} mm, and standard deviations of {sd} mm do not contain that. Register the clouds of this epoch to \
-            those of the first, with their cameras, and run again",
+            are wrong by up to {error} mm, which standard deviations of {sd} mm do not contain",
             "diese Epoche ist als Ganzes um {angle} Grad gegen die erste gedreht. Bewegungen werden für kleine Drehungen berechnet: hier \
-            sind sie um bis zu {error} mm falsch, was Standardabweichungen von {sd} mm nicht enthalten. Die Punktwolken dieser Epoche \
-            samt ihren Kameras auf die der ersten registrieren und neu rechnen";
+            sind sie um bis zu {error} mm falsch, was Standardabweichungen von {sd} mm nicht enthalten";
     }
 }

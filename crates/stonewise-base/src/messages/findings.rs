@@ -13,8 +13,8 @@ messages! {
             "{x} x {y} x {z} m, {points} Punkte: sind die Koordinaten in Metern?";
         FROM_SCANNER = "origin": "points from a scanner", "Punkte von einem Scanner";
         FROM_PHOTOS = "origin": "points from photos", "Punkte aus Fotos";
-        FROM_UNKNOWN = "origin": "neither intensities nor times nor colours show what the points come from; they count as scanned: say so \
-                     with origin = \"scanner\" or \"photos\" in the epoch",
+        FROM_UNKNOWN = "origin": "neither intensities nor times nor colours show what the points come from; they count as scanned: state \
+                     origin = \"scanner\" or \"photos\" in the epoch",
             "weder Intensitäten noch Zeiten noch Farben zeigen, woher die Punkte stammen; sie gelten als gescannt: das mit origin = \
             \"scanner\" oder \"photos\" in der Epoche angeben";
         ONE_BUNDLE = "origin": "its photos and those of the first epoch were adjusted in one bundle",
@@ -59,9 +59,9 @@ messages! {
                 each cloud only once",
             "{share} % der Punkte sind doppelt vorhanden und würden doppelt zählen; die Intervalle der Bewegungen wären dann zu klein: \
              jede Punktwolke nur einmal angeben";
-        LIES_FLAT = "lies-flat": "nearly all surfaces lie flat, and {share} % of the points are on steep ones: a wall stands. If the wall lies on its back, \
+        LIES_FLAT = "lies-flat": "nearly all surfaces lie flat, and only {share} % of the points are on steep ones; a wall is upright. If it lies on its back, \
                     Y points up in the cloud: export it with Z up, cameras included",
-            "fast alle Flächen liegen waagrecht, {share} % der Punkte auf steilen: eine Mauer steht. Liegt sie auf dem Rücken, zeigt in der \
+            "fast alle Flächen liegen waagrecht, nur {share} % der Punkte auf steilen; eine Mauer steht aufrecht. Liegt sie auf dem Rücken, zeigt in der \
              Punktwolke Y nach oben: sie mit Z nach oben ausgeben, samt den Kameras";
         NORTH_FIRST = "axis-order": "X is where northings are and Y where eastings are: if X points north, as for German surveyors, exchange both, or the wall \
                       is mirrored",
@@ -88,8 +88,8 @@ messages! {
             "die Fotos sind nicht so groß, wie ihre Kameras sagen: {photos}; sie in der Größe ihrer Kameras verwenden";
         FLAT_PHOTOS = "unlike-photos": "of one colour: {photos}; copy them again, or take their cameras out of the camera file",
             "einfarbig: {photos}; sie noch einmal kopieren oder ihre Kameras aus der Kameradatei nehmen";
-        UNLIKE_PHOTOS = "unlike-photos": "show something else than the other photos do where they see the same points: {photos} (correlation {most} or less); is the photo under another's \
-                        name, or turned?",
+        UNLIKE_PHOTOS = "unlike-photos": "show something other than the other photos do where they see the same points: {photos} (correlation {most} or less); does the photo have another's \
+                        name, or is it turned?",
             "zeigen etwas anderes als die übrigen Fotos an denselben Punkten: {photos} (Korrelation höchstens {most}); trägt das Foto den Namen eines anderen, oder ist es gedreht?";
         UNLIKE_ALL = "unlike-photos": "no two photos show the same where they see the same points: are these the photos of these cameras, and are cameras and \
                      clouds in one frame?",
@@ -100,8 +100,8 @@ messages! {
             "keine in {file} für {photos}; ein Lauf lässt diese Fotos weg";
         NO_MASK_FITS = "missing-masks": "none in {file} for any of the photos: masks are found by the names of the photos",
             "keine in {file} für irgendein Foto: Masken werden nach den Namen der Fotos gefunden";
-        NO_MASK_USABLE = "unusable-masks": "none of the masks in {file} can be used: see what is said of them",
-            "keine der Masken in {file} ist zu verwenden: siehe, was dazu gesagt wird";
+        NO_MASK_USABLE = "unusable-masks": "none of the masks in {file} can be used: other lines of this table say why",
+            "keine der Masken in {file} ist zu verwenden: andere Zeilen dieser Tabelle sagen, warum";
         ONE_MASK_EACH = "unusable-masks": "one single mask in each photo in {file}: every stone needs a mask, or a value, of its own",
             "eine einzige Maske in jedem Foto in {file}: jeder Stein braucht eine eigene Maske oder einen eigenen Wert";
         MASKS: "masks", "Masken";

@@ -51,14 +51,14 @@ messages! {
             "Steine werden in {n} Ansichten des schattierten Reliefs der Punktwolke gesucht";
 
         PHOTOS_CHOSEN = "photos-chosen":
-            "stones are looked for in {n} of {all} photos, at {scales} of their size: {each} photos show each part of the wall, or as many as \
+            "stones are looked for in {n} of {all} photos, at scale {scales}: {each} photos show each part of the wall, or as many as \
             there are; {stones}",
-            "Steine werden in {n} von {all} Fotos gesucht, bei {scales} ihrer Größe: jeden Teil der Mauer zeigen {each} Fotos oder alle, die \
+            "Steine werden in {n} von {all} Fotos gesucht, im Maßstab {scales}: jeden Teil der Mauer zeigen {each} Fotos oder alle, die \
             es gibt; {stones}";
 
         SIZE_OF_STONES:
-            "nine tenths of the stones of a first look are larger than {size} m",
-            "neun Zehntel der Steine eines ersten Blicks sind größer als {size} m";
+            "nine tenths of the stones found in a first look are larger than {size} m",
+            "neun Zehntel der bei einem ersten Blick gefundenen Steine sind größer als {size} m";
 
         SIZE_UNKNOWN:
             "a first look shows too few stones to tell how large they are",
@@ -85,10 +85,10 @@ messages! {
 
         COMPONENT_AT_BOUND = "component-at-bound":
             "the variance component \"{name}\" lies at the upper end of its range: the survey shows larger differences than are expected of \
-            masonry. Parts of the wall moved unlike the rest, clouds of the epochs do not fit each other, or masks are no stones",
+            masonry. Parts of the wall moved unlike the rest, clouds of the epochs do not fit each other, or masks show things other than stones",
             "die Varianzkomponente „{name}“ liegt am oberen Ende ihres Bereichs: die Aufnahme zeigt größere Unterschiede, als bei Mauerwerk \
             zu erwarten sind. Teile der Mauer haben sich anders bewegt als der Rest, Punktwolken der Epochen passen nicht zueinander, oder Masken \
-            sind keine Steine";
+            zeigen anderes als Steine";
 
         COULD_BE_STABLE = "could-be-stable":
             "areas off the wall are seen in both epochs and could show their registration ({count} found): auto_stable = true uses them all, \
@@ -180,7 +180,7 @@ messages! {
             abgezogen, und was an ihm unsicher bleibt, steckt in Grenzen und Intervallen";
 
         DATUM_STATED = "datum":
-            "the project states a registration error of {error_mm} mm per axis and epoch; limits and intervals hold it",
+            "the project states a registration error of {error_mm} mm per axis and epoch; limits and intervals include it",
             "das Projekt gibt einen Registrierungsfehler von {error_mm} mm je Achse und Epoche an; Grenzen und Intervalle enthalten ihn";
 
         DATUM_ONE_SURVEY = "datum":
@@ -189,7 +189,7 @@ messages! {
 
         DATUM_SOURCES = "datum":
             "the registration error follows from how the stations and strips of each epoch differ, and from an assumed error of {error_mm} mm \
-            per axis that all sources of an epoch share; limits and intervals hold both",
+            per axis that all sources of an epoch share; limits and intervals include both",
             "der Registrierungsfehler folgt daraus, wie sich Standpunkte und Streifen jeder Epoche unterscheiden, und aus einem angenommenen \
             Fehler von {error_mm} mm je Achse, den alle Quellen einer Epoche teilen; Grenzen und Intervalle enthalten beides";
 

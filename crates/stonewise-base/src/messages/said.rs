@@ -52,6 +52,16 @@ impl Said {
         format!("{}{}", self.english, code.collect::<String>())
     }
 
+    /// The sentence, and another behind it, in English and in German.
+    #[must_use]
+    pub fn and(self, [english, german]: [&str; 2]) -> Self {
+        Self {
+            code: self.code,
+            english: format!("{}. {english}", self.english),
+            german: self.german.map(|said| format!("{said}. {german}")),
+        }
+    }
+
     /// What was looked at, and what was seen, with a colon between them; in German where both are.
     pub fn about(topic: &Self, text: &Self) -> Self {
         let german = topic.german.as_ref().zip(text.german.as_ref());

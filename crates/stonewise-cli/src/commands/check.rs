@@ -4,7 +4,9 @@ use crate::args::CheckArgs;
 use crate::commands::Outcome;
 use crate::printer::Printer;
 use crate::stdout::stdout;
+use crate::steps::wrapped;
 use anyhow::{Result, bail};
+use console::Term;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use stonewise::check::{Depth, Verdict, check as look_at};
@@ -22,7 +24,16 @@ pub fn check(args: &CheckArgs, force: bool, printer: &Printer) -> Result<Outcome
     let page = page_path(args, &project, force)?;
     let report = look_at(&project, &args.out, Depth::Full, printer)?;
     printer.finish();
-    write!(stdout(), "{}", report.text())?;
+    // Under its column, the text of a row takes as many lines of a terminal as it needs.
+    let width = Term::stdout()
+        .size_checked()
+        .map_or(usize::MAX, |(_, columns)| usize::from(columns));
+    for (row, finding) in report.text().lines().zip(&report.findings) {
+        let indent = row.find(&finding.text).map_or(0, |at| row[..at].chars().count());
+        for line in wrapped(row, width, indent) {
+            writeln!(stdout(), "{line}")?;
+        }
+    }
     match report.write_page(&page, &project) {
         Ok(()) => printer.log(&format!("pictures: {}", page.display())),
         Err(error) => printer.log(&format!(

@@ -2,15 +2,16 @@
 
 use crate::args::{ExitOn, RunArgs, Step};
 use crate::commands::Outcome;
-use crate::counted::counted;
-use crate::note::note;
 use crate::printer::Printer;
 use anyhow::{Context, Result};
 use std::path::Path;
 use stonewise::results::names::PairFile;
 use stonewise::results::records::{EpochVerdict, State};
 use stonewise::results::{Status, StoneRow};
-use stonewise::{OutputFolder, PREVIOUS_DIR, PROJECT_STEP, Project, ScansProject, Summary, Until, is_scan};
+use stonewise::{
+    Language, OutputFolder, PREVIOUS_DIR, PROJECT_STEP, Project, ScansProject, Summary, Until, Warning,
+    is_scan,
+};
 use stonewise_core::progress::Progress;
 
 /// Runs a whole project; with `--exit-on` the verdict decides the exit code.
@@ -125,23 +126,82 @@ fn unfinished(out: &Path) -> String {
 
 /// Prints the notes on how the project file was read.
 pub fn tell_of_project(project: &Project, printer: &Printer) {
+    let words = Words::of(project);
     for note in &project.notes {
-        printer.log(&format!("note: {}", note.line()));
+        let text = match words.language {
+            Language::English => note.english.as_str(),
+            Language::German => note.in_german(),
+        };
+        printer.remark(words.note, text, note.code.as_deref());
+    }
+}
+
+/// What the command says around the results, in the language of the project.
+struct Words {
+    language: Language,
+    doubt: &'static str,
+    skipped: &'static str,
+    note: &'static str,
+    /// What is counted of the stones: all, matched, measured, moved, loose.
+    counted: [&'static str; 5],
+    cannot_tell: &'static str,
+}
+
+static ENGLISH: Words = Words {
+    language: Language::English,
+    doubt: "DOUBT",
+    skipped: "skipped",
+    note: "note",
+    counted: ["stones", "matched", "measured", "moved", "loose"],
+    cannot_tell: "which of them moved or are loose cannot be told",
+};
+
+static GERMAN: Words = Words {
+    language: Language::German,
+    doubt: "ZWEIFEL",
+    skipped: "ausgelassen",
+    note: "Hinweis",
+    counted: ["Steine", "zugeordnet", "gemessen", "bewegt", "lose"],
+    cannot_tell: "welche davon sich bewegt haben oder lose sind, ist nicht zu sagen",
+};
+
+impl Words {
+    fn of(project: &Project) -> &'static Self {
+        match project.settings.report.language {
+            Language::English => &ENGLISH,
+            Language::German => &GERMAN,
+        }
+    }
+
+    /// Subject and message of a warning.
+    fn warning(&self, warning: &Warning) -> String {
+        let german = warning
+            .german
+            .as_ref()
+            .filter(|_| self.language == Language::German);
+        format!("{}: {}", warning.subject, german.unwrap_or(&warning.message))
     }
 }
 
 /// Prints in a few lines what came out, without the notes on the project file. Doubts come first, also with `--quiet`.
 pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
+    let words = Words::of(project);
     for doubt in summary.doubts() {
-        note(&format!("DOUBT: {}", doubt.line()));
+        let code = doubt.code.iter().map(|code| format!(" [{code}]"));
+        let code = code.collect::<String>();
+        printer.always(&format!("{}: {}{code}", words.doubt, words.warning(doubt)));
     }
     for warning in summary
         .warnings
         .iter()
         .filter(|w| !w.doubt && w.step != PROJECT_STEP)
     {
-        let word = if warning.skipped_input { "skipped" } else { "note" };
-        printer.log(&format!("{word}: {}", warning.line()));
+        let word = if warning.skipped_input {
+            words.skipped
+        } else {
+            words.note
+        };
+        printer.remark(word, &words.warning(warning), warning.code.as_deref());
     }
     for (epoch, pair) in project.epochs.iter().skip(1).zip(&summary.pairs) {
         if pair.rows.is_empty() {
@@ -149,30 +209,32 @@ pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
         }
         let verdicts = summary.verdict.iter().flat_map(|v| &v.epochs);
         let verdict = verdicts.into_iter().find(|v| v.epoch == epoch.name);
-        let against = format!("{} against {}", epoch.name, project.epochs.reference().name);
-        printer.log(&format!("{against}: {}", counts(&pair.rows, verdict)));
+        printer.log(&format!("{}: {}", epoch.name, counts(&pair.rows, verdict, words)));
         // The sentence on a single later epoch is the last line.
         if let Some(verdict) = verdict.filter(|_| summary.pairs.len() > 1) {
-            printer.log(&format!("{against}: {}", verdict.sentence));
+            printer.log(&format!("{}: {}", epoch.name, verdict.sentence));
         }
     }
 }
 
-fn counts(rows: &[StoneRow], verdict: Option<&EpochVerdict>) -> String {
-    let matched = rows.iter().filter(|r| r.matched_id.is_some()).count();
-    let measured = rows.iter().filter(|r| r.status == Status::Ok).count();
-    let motions = || rows.iter().filter_map(|r| r.motion.as_ref());
-    let above = motions().filter(|m| m.significant).count();
+fn counts(rows: &[StoneRow], verdict: Option<&EpochVerdict>, words: &Words) -> String {
+    let count = |is: fn(&StoneRow) -> bool| rows.iter().filter(|row| is(row)).count();
+    let numbers = [
+        rows.len(),
+        count(|r| r.matched_id.is_some()),
+        count(|r| r.status == Status::Ok),
+        verdict.map_or(0, |v| v.wall.moved),
+        count(|r| r.motion.as_ref().is_some_and(|m| m.loose)),
+    ];
+    let mut said: Vec<String> = words
+        .counted
+        .iter()
+        .zip(numbers)
+        .map(|(word, n)| format!("{word} {n}"))
+        .collect();
     if verdict.is_some_and(|v| !v.is_sound()) {
-        return format!(
-            "{}, {matched} matched, {measured} measured; which of them moved or are loose cannot be told",
-            counted(rows.len(), "stone")
-        );
+        said.truncate(3);
+        said.push(words.cannot_tell.to_owned());
     }
-    let loose = motions().filter(|m| m.loose).count();
-    let moved = verdict.map_or(String::new(), |v| format!("{} moved, ", v.wall.moved));
-    format!(
-        "{}, {matched} matched, {measured} measured, {above} above their limit, {moved}{loose} loose",
-        counted(rows.len(), "stone")
-    )
+    said.join(", ")
 }

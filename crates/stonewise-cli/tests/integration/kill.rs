@@ -25,7 +25,7 @@ fn start(out: &Path) -> Child {
         .unwrap()
 }
 
-/// A step as a run announces it: `[2.4 s] 3/15 clouds of epoch 2`.
+/// A step as a run announces it: `[2.4 s] 3/6 match the stones`.
 struct Step {
     number: usize,
     begun: Duration,

@@ -7,6 +7,7 @@ pub(crate) mod adjustment;
 mod bulges;
 mod deformation;
 mod gicp;
+mod least_deviance;
 mod modes;
 mod moved;
 pub mod observers;

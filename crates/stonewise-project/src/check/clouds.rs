@@ -34,7 +34,7 @@ const LEAST_OVERLAP: f64 = 0.5;
 /// A spacing beyond this shows no stone's relief, metres.
 const WIDEST_SPACING_M: f64 = 0.05;
 /// Distances between points across a stone (root of its area) from which on views show nearly all stones
-/// (docs/src/views.md).
+/// (docs/src/accuracy.md).
 const FOUND_WELL: f64 = 12.0;
 
 pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding> {

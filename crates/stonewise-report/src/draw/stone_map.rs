@@ -17,6 +17,10 @@ const MIN_STEP: i64 = 4;
 /// length do not touch.
 const ARROW_PX: f64 = 34.0;
 const ARROW_SPACING_PX: f64 = 26.0;
+/// Width of the outline of an area that changed its shape, tenths of a pixel; stones cover its inner half.
+const AREA_PX: u32 = 70;
+/// Size of stones from which on each has room for its number, pixels.
+const NUMBERED_PX: f64 = 26.0;
 
 /// Where everything lies in every map of one wall, and the path of every stone.
 pub(crate) struct MapLayout<'a> {
@@ -49,6 +53,10 @@ pub(crate) struct MapPicture<'a> {
     pub arrows: bool,
     /// Draw a heavy outline around loose stones.
     pub loose: bool,
+    /// Draw an outline around the areas that changed their shape.
+    pub areas: bool,
+    /// Write numbers on stones: on these, or on all where there is room.
+    pub numbers: Option<&'a [u32]>,
 }
 
 impl<'a> MapLayout<'a> {
@@ -212,6 +220,15 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
         }
     }
 
+    if picture.areas {
+        let stones = layout.results.stones.iter().zip(&layout.paths);
+        let within = stones.filter(|(stone, _)| stone.zone_id > 0);
+        let areas: String = within.map(|(_, path)| path.as_str()).collect();
+        let _ = write!(
+            out,
+            r#"<path class="area" stroke-width="{AREA_PX}" d="{areas}"/>"#
+        );
+    }
     if !unknown.is_empty() {
         let _ = write!(
             out,
@@ -250,9 +267,30 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
     if picture.arrows {
         draw_arrows(layout, picture.strong.is_some(), &mut out);
     }
+    if let Some(named) = picture.numbers {
+        write_numbers(layout, named, &mut out);
+    }
     layout.draw_bar(&mut out, picture.scale, picture.unit);
     out.push_str("</svg>");
     out
+}
+
+/// Writes the numbers of stones on them.
+fn write_numbers(layout: &MapLayout, named: &[u32], out: &mut String) {
+    let has_room = layout.stone_px >= NUMBERED_PX;
+    let numbered = |s: &&StoneRow| has_room || named.contains(&s.stone_id);
+    for stone in layout.results.stones.iter().filter(numbered) {
+        let at = layout.results.facade.place(&stone.centroid);
+        let (x, y) = (layout.axes.px(at.x), layout.axes.py(at.y));
+        if x.is_finite() && y.is_finite() {
+            let _ = write!(
+                out,
+                r#"<text class="number" x="{x:.0}" y="{:.0}">{}</text>"#,
+                y + 3.0,
+                stone.stone_id
+            );
+        }
+    }
 }
 
 /// Draws the outlines of some stones in dashes of this pattern, with a title; `class`: that of the path.

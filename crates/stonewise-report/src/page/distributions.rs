@@ -150,9 +150,8 @@ pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
         .map(|k| {
             let all = &facts.components[k];
             let rest = Sorted::new(still.iter().map(|(_, m)| m.face[k]));
-            let cell = |v: Option<f64>| facts.mm(v.unwrap_or(f64::NAN));
             let row = [all.median(), all.nmad(), rest.median(), rest.nmad()];
-            let cells = row.into_iter().take(columns).map(cell);
+            let cells = row.into_iter().take(columns).map(|v| texts.mm_or_dash(v));
             iter::once(directions(names)[k].to_owned()).chain(cells).collect()
         })
         .collect();

@@ -96,7 +96,6 @@ fn document(results: &ResultSet, facts: &Summary, joints: &[Joint], blocks: Map<
             "rotation": limit(|m| m.rotation.norm()),
             "opening": nice_above(Sorted::new(openings).quantile(0.98).unwrap_or(0.0) * 1e3),
         },
-        "decimals": facts.decimals(),
         "sound": facts.verdict.is_sound(),
         "registrationKnown": results.datum().is_some_and(|d| d.state != DatumState::Unknown),
         "terms": terms(results).iter().map(|term| texts.terms[*term as usize]).collect::<Vec<_>>(),

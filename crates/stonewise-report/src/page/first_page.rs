@@ -4,6 +4,7 @@
 use super::html::{table, with_units};
 use super::look_first::look_first;
 use super::maps::lead_map;
+use super::worst_stone::before_and_after;
 use crate::summary::Summary;
 use crate::texts::{Texts, counted, fill};
 use base64::Engine;
@@ -43,6 +44,20 @@ pub(super) fn verdict(facts: &Summary) -> String {
         lamps.concat(),
         escape(&with_units(&facts.verdict.sentence))
     )
+}
+
+/// What to do after the verdict, and why there is one without thresholds.
+pub(super) fn next(results: &ResultSet, facts: &Summary) -> String {
+    let page = &facts.texts().page;
+    let [fine, look, mend] = page.next;
+    let next = match facts.verdict.state {
+        State::Fine => fine,
+        State::Attention | State::Alarm => look,
+        State::CannotTell => mend,
+    };
+    let is_by_motion = facts.verdict.state == State::Attention && results.thresholds().is_empty();
+    let why = if is_by_motion { page.no_thresholds } else { "" };
+    format!("<p class=\"next\">{why} {next}</p>")
 }
 
 /// Who measured, with what, and the number of the report.
@@ -129,13 +144,14 @@ pub(super) fn body(results: &ResultSet, facts: &Summary) -> String {
     };
     format!(
         "<div class=\"statement\"><div class=\"first\"><p class=\"limit\">{}</p><h3>{}</h3>{}</div><div class=\"first rest\"><h3>{}</h3>{}</div>\
-         <div class=\"beside\">{map}{}</div></div>\
+         <div class=\"beside\">{map}{}{}</div></div>\
          {}",
         limit(facts),
         page.look_first,
         look_first(results, facts),
         page.not_measured,
         not_measured(facts),
+        before_and_after(results, facts),
         zones(facts),
         signature(results, facts.texts())
     )
@@ -213,13 +229,12 @@ fn limit(facts: &Summary) -> String {
     if !facts.verdict.is_sound() {
         return format!("<b>{}</b>", texts.page.limit_unknown);
     }
-    let values = facts.limits.median().zip(facts.limits.quantile(0.9));
-    let Some((median, high)) = values else {
+    let Some(median) = facts.limits.median() else {
         return String::new();
     };
     let text = fill(
         texts.clauses.detection_limit(facts.verdict.has_datum()),
-        &[("median", &*texts.mm(median)), ("high", &*texts.mm(high))],
+        &[("median", &*texts.mm(median))],
     );
     let mut letters = text.chars();
     let first = letters
@@ -323,7 +338,7 @@ pub(super) fn said(english: &str, german: Option<&str>, texts: &Texts) -> String
     }
 }
 
-fn with_code(message: &str) -> String {
+pub(super) fn with_code(message: &str) -> String {
     let escaped = escape(message);
     if escaped.matches('`').count() % 2 == 1 {
         return escaped;

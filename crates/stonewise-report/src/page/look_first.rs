@@ -53,6 +53,18 @@ pub(super) fn look_first(results: &ResultSet, facts: &Summary) -> String {
     }
 }
 
+/// The stones that are named, the worst first.
+pub(super) fn named(verdict: &EpochVerdict) -> Vec<u32> {
+    let looks = worst(verdict).into_iter().take(FIRST);
+    looks
+        .flat_map(|look| match look {
+            Look::Stone(stone) => vec![stone.stone_id],
+            Look::Joint(joint) => joint.stones.to_vec(),
+            Look::Zone(_) => Vec::new(),
+        })
+        .collect()
+}
+
 /// By state; within a state the worst of every kind, then the second of every kind and so on, so that no kind
 /// hides another. Each stone comes once. A lost stone ranks with alarms.
 fn worst(verdict: &EpochVerdict) -> Vec<Look<'_>> {

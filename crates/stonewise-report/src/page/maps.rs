@@ -2,6 +2,7 @@
 
 use super::explorer::PLACE;
 use super::html::{figure, section};
+use super::look_first::named;
 use crate::draw::{MapLayout, MapPicture, distance_map, joint_map, stone_map};
 use crate::summary::Summary;
 use crate::texts::{MapTexts, fill};
@@ -48,12 +49,14 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> St
             strong: facts.verdict.is_sound().then_some(is_significant),
             arrows: false,
             loose: facts.verdict.is_sound(),
+            areas: false,
+            numbers: None,
         };
         figure(title, &stone_map(&layout, &picture), note)
     };
 
     let mut grid = String::new();
-    grid.push_str(&shape_map(&layout, facts));
+    grid.push_str(&shape_map(&layout, facts, None));
     grid.push_str(&component(names.along, names.along_note, 0));
     grid.push_str(&component(names.up, names.up_note, 1));
     grid.push_str(&component(names.out, names.out_note, 2));
@@ -83,7 +86,7 @@ fn is_significant(stone: &StoneRow) -> bool {
 
 /// How far stones moved besides the rigid motion of the part of the wall that kept its shape; empty where that is not
 /// known of any stone.
-fn shape_map(layout: &MapLayout, facts: &Summary) -> String {
+fn shape_map(layout: &MapLayout, facts: &Summary, numbers: Option<&[u32]>) -> String {
     let length = |s: &StoneRow| Some(s.motion.as_ref()?.deformation()?.norm());
     let lengths = || {
         facts
@@ -95,21 +98,19 @@ fn shape_map(layout: &MapLayout, facts: &Summary) -> String {
     if lengths().next().is_none() {
         return String::new();
     }
-    let names = &facts.texts().maps;
+    let (names, is_sound) = (&facts.texts().maps, facts.verdict.is_sound());
     let picture = MapPicture {
         title: names.shape,
         value: &length,
         unit: "mm",
         scale: Scale::Sequential(nice_scale_m(lengths())),
-        strong: facts.verdict.is_sound().then_some(|s| s.zone_id > 0),
+        strong: is_sound.then_some(|s| s.zone_id > 0),
         arrows: false,
         loose: false,
+        areas: is_sound,
+        numbers,
     };
-    let marks = if facts.verdict.is_sound() {
-        names.shape_faded
-    } else {
-        ""
-    };
+    let marks = if is_sound { names.shape_faded } else { "" };
 
     figure(
         names.shape,
@@ -125,7 +126,7 @@ pub(super) fn lead_map(results: &ResultSet, facts: &Summary) -> String {
     }
     let layout = MapLayout::new(results, facts.texts());
     let class = if layout.is_wide() { "lead wide" } else { "lead" };
-    match shape_map(&layout, facts) {
+    match shape_map(&layout, facts, Some(&named(&facts.verdict))) {
         shape if shape.is_empty() => motion_map(results, facts),
         shape => format!("<div class=\"{class}\">{shape}</div>"),
     }
@@ -164,6 +165,7 @@ fn motion_map(results: &ResultSet, facts: &Summary) -> String {
     let title = page.map_title;
     let is_sound = facts.verdict.is_sound();
     let end_m = nice_scale_m(norms);
+    let numbers = named(&facts.verdict);
     let picture = MapPicture {
         title,
         value: &norm,
@@ -172,6 +174,8 @@ fn motion_map(results: &ResultSet, facts: &Summary) -> String {
         strong: is_sound.then_some(is_significant),
         arrows: true,
         loose: false,
+        areas: is_sound,
+        numbers: Some(&numbers),
     };
 
     let class = if layout.is_wide() { "lead wide" } else { "lead" };
@@ -189,7 +193,11 @@ fn motion_map(results: &ResultSet, facts: &Summary) -> String {
         &[("end", &*facts.texts().threshold(end_m * 1e3))],
     );
 
-    let note = format!("{colours}{marks}{as_measured}");
+    let areas = match is_sound && facts.measured.iter().any(|(s, _)| s.zone_id > 0) {
+        true => page.map_zones,
+        false => "",
+    };
+    let note = format!("{colours}{marks}{areas}{as_measured}");
     format!(
         "<div class=\"{class}\">{}</div>",
         figure(title, &stone_map(&layout, &picture), &note)
@@ -215,6 +223,8 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
             strong: None,
             arrows: false,
             loose: loose && facts.verdict.is_sound(),
+            areas: false,
+            numbers: None,
         };
         figure(title, &stone_map(layout, &picture), note)
     };

@@ -2,6 +2,7 @@
 
 mod audit;
 mod block;
+mod checks;
 mod distributions;
 mod document;
 mod doubts;
@@ -19,6 +20,7 @@ mod pair;
 mod series;
 mod survey;
 mod tracked;
+mod worst_stone;
 mod yearly;
 
 pub(super) use yearly::yearly;
@@ -39,7 +41,7 @@ use stonewise_results::{Comparison, Joint, ResultSet, compare, joints};
 pub(super) use explorer::{SCRIPT, STYLE};
 
 /// Sections in the order of the page.
-fn sections(texts: &Texts) -> [(&'static str, &'static str); 10] {
+fn sections(texts: &Texts) -> [(&'static str, &'static str); 11] {
     let names = &texts.sections;
     [
         ("summary", texts.page.summary),
@@ -49,6 +51,7 @@ fn sections(texts: &Texts) -> [(&'static str, &'static str); 10] {
         ("distributions", names.distributions),
         ("datum", names.datum),
         ("instruments", texts.instruments.heading),
+        ("checks", texts.checks.heading),
         ("evaluation", names.evaluation),
         ("method", names.method),
         ("audit", names.audit),
@@ -150,6 +153,7 @@ fn content(
     }
 
     body.push_str(&instruments::instruments(results, facts.texts()));
+    body.push_str(&checks::checks(results, facts.texts()));
     if let Some(evaluation) = &results.evaluation {
         body.push_str(&evaluation::evaluation(evaluation, facts.texts()));
     }
@@ -168,10 +172,11 @@ fn header(results: &ResultSet, facts: &Summary) -> String {
         .as_ref()
         .map_or(&[][..], |run| run.warnings.as_slice());
     format!(
-        "<header>{}<h1>{}</h1>{}{}{}{}{}</header>\n",
+        "<header>{}<h1>{}</h1>{}{}{}{}{}{}</header>\n",
         first_page::letterhead(results, texts.page.kind),
         title(results, texts),
         first_page::verdict(facts),
+        first_page::next(results, facts),
         doubts::doubts(warnings, texts),
         first_page::datum_warning(results.datum(), facts),
         first_page::cover(results, facts),

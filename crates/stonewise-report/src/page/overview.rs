@@ -54,20 +54,14 @@ fn tiles(facts: &Summary) -> String {
 
     let mm = |metres: Option<f64>| format!("{} <small>mm</small>", texts.mm(metres.unwrap_or(f64::NAN)));
     let largest = facts.verdict.wall.largest;
-    let [what_moved, what_is_largest, what_limit] = match facts.verdict.has_datum() {
-        true => [page.tile_moved, page.tile_largest, page.tile_limit],
-        false => [
-            page.tile_moved_common,
-            page.tile_largest_common,
-            page.tile_limit_common,
-        ],
+    let [what_moved, what_is_largest] = match facts.verdict.has_datum() {
+        true => [page.tile_moved, page.tile_largest],
+        false => [page.tile_moved_common, page.tile_largest_common],
     };
     let tiles = [
         measured,
         tile(of_measured(facts.moved.len()), what_moved),
-        tile(of_measured(facts.above_limit), page.tile_above),
         tile(count(facts.loose.len()), page.tile_loose),
-        tile(mm(facts.limits.median()), what_limit),
         match largest {
             Some(largest) => tile(mm(Some(largest.length_mm / 1e3)), what_is_largest),
             None => tile("\u{2013}".to_owned(), page.tile_no_motion),
@@ -226,12 +220,12 @@ fn stone_rows(results: &ResultSet, facts: &Summary, stones: &[(&StoneRow, &RowMo
             format!("<a data-stone=\"{0}\">{0}</a>", s.stone_id),
             texts.number(place.x, 2),
             texts.number(place.y, 2),
-            facts.mm(m.face.x),
-            facts.mm(m.face.y),
-            facts.mm(m.face.z),
-            facts.mm(m.displacement.norm()),
-            facts.mm(m.detection_limit_m),
-            facts.mm(m.relative.norm()),
+            texts.mm(m.face.x),
+            texts.mm(m.face.y),
+            texts.mm(m.face.z),
+            texts.mm(m.displacement.norm()),
+            texts.mm(m.detection_limit_m),
+            texts.mm(m.relative.norm()),
             texts.number(m.rotation.norm() * 1e3, 1),
             if m.loose { names.loose } else { "" }.into(),
         ]
@@ -273,7 +267,7 @@ fn stretches(results: &ResultSet, facts: &Summary) -> String {
         let part: Vec<_> = facts.measured.iter().filter(|(s, _)| inside(s)).collect();
         let above = part.iter().filter(|(_, m)| m.significant).count();
         let median = |of: fn(&RowMotion) -> f64| {
-            facts.mm(Sorted::new(part.iter().map(|(_, m)| of(m)))
+            texts.mm(Sorted::new(part.iter().map(|(_, m)| of(m)))
                 .median()
                 .unwrap_or(f64::NAN))
         };

@@ -184,6 +184,8 @@ pub(super) fn map(results: &ResultSet, facts: &Summary) -> String {
         strong: None,
         arrows: false,
         loose: false,
+        areas: false,
+        numbers: None,
     };
     let wide = if layout.is_wide() { " wide" } else { "" };
     let picture = figure(names.map, &stone_map(&layout, &picture), names.map_note);

@@ -23,7 +23,7 @@ pub(crate) struct InstrumentTexts {
 pub(super) static ENGLISH: InstrumentTexts = InstrumentTexts {
     heading: "Other instruments",
     intro: "Motion since the reference along x / y / z, mm. Stones: mean of the nearest ones. Difference: stones less instrument, with the 95 % interval of both and of the registration where it is known; where it is not, less what the other instruments say of it.",
-    together: "All of them together: so large differences come about by chance with a probability of {p}.",
+    together: "All of them together: chance makes differences this large with a probability of {p}.",
     columns: [
         "Instrument",
         "measured",
@@ -33,7 +33,7 @@ pub(super) static ENGLISH: InstrumentTexts = InstrumentTexts {
     ],
     words: ["yes", "no", "cannot tell"],
     uses: [
-        "The instruments in use are observations of the datum: the motions of this report hold them, the table does not.",
+        "The instruments in use are observations of the datum: they are in the motions of this report, not in the table.",
         "The instruments in use do not determine the datum and are not used.",
         "The instruments in use contradict each other or the datum and are not used.",
     ],
@@ -58,7 +58,7 @@ pub(super) static GERMAN: InstrumentTexts = InstrumentTexts {
     ],
     words: ["ja", "nein", "keine Aussage"],
     uses: [
-        "Die verwendeten Messeinrichtungen sind Beobachtungen des Datums: die Bewegungen dieses Berichts enthalten sie, die Tabelle nicht.",
+        "Die verwendeten Messeinrichtungen sind Beobachtungen des Datums: sie stecken in den Bewegungen dieses Berichts, nicht in der Tabelle.",
         "Die verwendeten Messeinrichtungen bestimmen das Datum nicht und sind nicht verwendet.",
         "Die verwendeten Messeinrichtungen widersprechen einander oder dem Datum und sind nicht verwendet.",
     ],

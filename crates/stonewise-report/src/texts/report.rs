@@ -25,7 +25,7 @@ in_both! {
         datum: "Datum", "Geodätisches Datum";
         datum_title: "Datum check", "Prüfung des geodätischen Datums";
         evaluation: "Known motion", "Bekannte Bewegung";
-        evaluation_title: "Known motion: how right the results are", "Bekannte Bewegung: wie richtig die Ergebnisse sind";
+        evaluation_title: "Known motion: how accurate the results are", "Bekannte Bewegung: wie genau die Ergebnisse sind";
         method: "Method", "Verfahren";
         method_title: "Method, terms and limits", "Verfahren, Begriffe und Grenzen";
         audit: "Audit", "Nachweise";
@@ -169,6 +169,25 @@ in_both! {
 }
 
 in_both! {
+    /// The checks of the run.
+    CheckTexts {
+        heading: "Checks", "Prüfungen";
+        intro: "A check that failed puts the results as a whole in doubt.",
+            "Eine nicht bestandene Prüfung macht die Ergebnisse als Ganzes zweifelhaft.";
+        check: "what is checked", "was geprüft wird";
+        epoch: "epoch", "Epoche";
+        value: "value", "Wert";
+        limit: "limit", "Grenze";
+        source: "where the limit is from", "woher die Grenze stammt";
+        outcome: "outcome", "Ergebnis";
+        at_least: "at least {limit}", "mindestens {limit}";
+        at_most: "at most {limit}", "höchstens {limit}";
+        passed: "passed", "bestanden";
+        failed: "failed", "nicht bestanden";
+    }
+}
+
+in_both! {
     /// The score against a known motion.
     ScoreTexts {
         stones: "Stones", "Steine";
@@ -229,7 +248,7 @@ in_both! {
         <h3>Limitations</h3><p>Displacements refer to the registration of the epochs, so a motion common to many stones \u{2013} \
         a shift, a tilt, a slow drift along the wall \u{2013} may be an error of it, however small the limits of single stones are. A \
         stone is taken as rigid. Masks that merge or split stones spoil single rows; such pairs are reported as failed where they \
-        can be told. Values of stones that were not measured are unknown, not zero.</p>",
+        are recognised. Values of stones that were not measured are unknown, not zero.</p>",
         "<p>Steine werden in den Fotos umrissen, ihre Nummern auf die Punkte der Wolke jeder Epoche übertragen, Steine über die Epochen hinweg \
         zugeordnet, und aus ihren Punkten wird die starre Bewegung jedes zugeordneten Steins geschätzt.</p>\
         <dl class=\"terms\">\

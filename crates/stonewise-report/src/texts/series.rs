@@ -93,9 +93,9 @@ pub(super) static ENGLISH: SeriesTexts = SeriesTexts {
     model: "Model of every stone: a constant and {terms}.",
     not_given: "{term}: not given for {epochs}",
     too_few: "{have} epochs are too few for {term}: it takes {need}",
-    same: "{n} epochs, always at the same {term}: what it does cannot be told",
-    same_season: "{n} epochs, always in the same season: what the season does cannot be told",
-    two_seasons: "{n} epochs in two seasons: a yearly wave cannot be told",
+    same: "{n} epochs, always at the same {term}: its effect cannot be determined",
+    same_season: "{n} epochs, always in the same season: its effect cannot be determined",
+    two_seasons: "{n} epochs in two seasons: a yearly cycle cannot be determined",
     goes_with: "{n} epochs, in which {term} and {other} change together: they cannot be told apart",
     undated: "Without a date, and left out: {epochs}",
     zone: [

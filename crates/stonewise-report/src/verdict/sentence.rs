@@ -291,15 +291,8 @@ impl Speaker<'_> {
 
     fn limit(&self) -> Option<String> {
         let limit = self.wall.detection_limit?;
-        let mm = |millimetres: f64| self.texts.mm(millimetres / 1e3);
-        let values = [
-            ("median", &*mm(limit.median_mm)),
-            ("high", &*mm(limit.percentile_90_mm)),
-        ];
-        Some(fill(
-            self.texts.clauses.detection_limit(self.case.has_datum()),
-            &values,
-        ))
+        let text = self.texts.clauses.detection_limit(self.case.has_datum());
+        Some(fill(text, &[("median", &*self.texts.mm(limit.median_mm / 1e3))]))
     }
 }
 

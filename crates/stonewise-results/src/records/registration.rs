@@ -34,16 +34,23 @@ pub struct RegistrationRecord {
 pub struct CheckRecord {
     /// Name under which `stonewise explain` says more of it.
     pub name: String,
+    /// The statistic in plain words, in the language of the report.
+    pub what: String,
+    /// The epoch that it is about.
+    pub epoch: String,
     /// What was found.
     pub statistic: f64,
     /// What it is compared with.
     pub limit: f64,
-    /// Where the limit is from.
+    /// Whether the limit is the least value that passes, not the largest.
+    pub at_least: bool,
+    /// Where the limit is from, in the language of the report.
     pub source: String,
-    /// What to do where it fails.
-    pub remedy: String,
     /// Whether it passed.
     pub passed: bool,
+    /// What to do, in the language of the report; absent where it passed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub remedy: Option<String>,
 }
 
 /// Whether and where the wall deformed.

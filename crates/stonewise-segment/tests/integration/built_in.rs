@@ -171,7 +171,7 @@ fn the_weights_say_where_they_come_from() {
     let runs = provenance["runs"].as_array().unwrap();
     let steps: u64 = runs.iter().map(|run| run["steps"].as_u64().unwrap()).sum();
     assert_eq!(Some(steps), provenance["steps"].as_u64());
-    let docs = include_str!("../../../../docs/src/method/built-in-weights.md");
+    let docs = include_str!("../../../../docs/src/method/segmentation.md");
     for run in runs {
         let commit = run["renderer_commit"].as_str().unwrap();
         assert!(docs.contains(commit), "the docs do not name {commit}");

@@ -2,26 +2,39 @@
 
 use stonewise_core::progress::Progress;
 
-/// The steps of a run in order: each by its name, and in words. Work that is not on the list counts as part
-/// of the step before it.
+/// The steps that a reader is told of, in order. Work that is not on the list counts as part of the step before it.
 #[derive(Debug, Default)]
-pub struct Agenda(Vec<(String, String)>);
+pub struct Agenda {
+    /// In words.
+    steps: Vec<String>,
+    /// Pieces of work by name, each with the place of its step.
+    places: Vec<(String, usize)>,
+}
 
 impl Agenda {
-    /// These steps, by name and in words, but for those that have no words.
-    pub fn of(steps: impl IntoIterator<Item = (String, String)>) -> Self {
-        Self(steps.into_iter().filter(|(_, words)| !words.is_empty()).collect())
+    /// Pieces of work, each by its name and with the step that it belongs to, in words.
+    pub fn of(work: impl IntoIterator<Item = (String, String)>) -> Self {
+        let mut agenda = Self::default();
+        for (name, words) in work {
+            let known = agenda.steps.iter().position(|step| *step == words);
+            let place = known.unwrap_or(agenda.steps.len());
+            if known.is_none() {
+                agenda.steps.push(words);
+            }
+            agenda.places.push((name, place));
+        }
+        agenda
     }
 
     /// Tells the list to the caller, and that its first step begins.
     pub fn announce(&self, progress: &dyn Progress) {
-        let words: Vec<String> = self.0.iter().map(|(_, words)| words.clone()).collect();
-        progress.agenda(&words);
+        progress.agenda(&self.steps);
         progress.enter(0);
     }
 
-    /// Place of a step in the list, counted from 0.
+    /// Place of the step that a piece of work belongs to, counted from 0.
     pub fn place(&self, name: &str) -> Option<usize> {
-        self.0.iter().position(|(listed, _)| listed == name)
+        let listed = self.places.iter().find(|(listed, _)| listed == name);
+        listed.map(|(_, place)| *place)
     }
 }

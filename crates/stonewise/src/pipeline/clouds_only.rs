@@ -154,7 +154,7 @@ fn outside_of(context: &Context, first: &Ingested) -> Result<Outside> {
 fn agenda(project: &Project, epochs: &[EpochId], name: &str, words: &str) -> Agenda {
     let step = &INGEST;
     let ingest = epochs.iter().map(|&epoch| Task { step, epoch });
-    let lines = ingest.map(|task| (task.id(), task.words(project)));
+    let lines = ingest.filter_map(|task| Some((task.id(), task.words(project)?)));
     Agenda::of(lines.chain([(name.to_owned(), words.to_owned())]))
 }
 

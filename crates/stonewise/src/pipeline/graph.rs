@@ -5,7 +5,7 @@ use super::cost::{Cost, Sizes};
 use super::until::Until;
 use crate::error::Result;
 use crate::project::Project;
-use crate::settings::Settings;
+use crate::report_params::Language;
 use std::any::{Any, TypeId};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -16,9 +16,8 @@ use stonewise_core::epoch::EpochId;
 pub struct Step {
     /// Its name; with the epoch's number behind it that of its files, its unit and its time.
     pub name: &'static str,
-    /// What a reader is told while it works, followed by the epoch's name; empty: it counts as part of the
-    /// step before it.
-    pub words: fn(&Settings) -> &'static str,
+    /// What a reader is told that it belongs to; `None`: it counts as part of the step before it.
+    pub phase: Option<Phase>,
     /// What it is about.
     pub about: About,
     /// The steps that come first.
@@ -33,6 +32,41 @@ pub struct Step {
     pub photos: Option<Photos>,
     /// Does it.
     pub make: fn(&Run, EpochId) -> Result<()>,
+}
+
+/// What steps are for, as a reader is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Looking at the survey and reading its clouds.
+    Read,
+    /// Finding stones in pictures and clouds.
+    Find,
+    /// Finding the stones of an epoch in another.
+    Match,
+    /// Measuring how the stones moved.
+    Measure,
+    /// Comparing the clouds without stones.
+    Compare,
+    /// Writing what a user opens.
+    Write,
+}
+
+impl Phase {
+    /// The phase in words.
+    pub fn words(self, language: Language) -> &'static str {
+        let [english, german] = match self {
+            Self::Read => ["read the survey", "Aufnahme einlesen"],
+            Self::Find => ["find the stones", "Steine finden"],
+            Self::Match => ["match the stones", "Steine zuordnen"],
+            Self::Measure => ["measure the motions", "Bewegungen messen"],
+            Self::Compare => ["compare the clouds", "Punktwolken vergleichen"],
+            Self::Write => ["write the results", "Ergebnisse schreiben"],
+        };
+        match language {
+            Language::English => english,
+            Language::German => german,
+        }
+    }
 }
 
 /// What a step is about.
@@ -109,7 +143,7 @@ impl Step {
     /// A step about the survey that every run does and that is no unit: what others change.
     pub const PLAIN: Self = Self {
         name: "",
-        words: |_| "",
+        phase: None,
         about: About::Survey,
         needs: &[],
         wanted: |_| true,
@@ -138,15 +172,16 @@ impl Task {
         }
     }
 
-    /// What a reader is told; empty where it is no step of its own.
-    pub fn words(&self, project: &Project) -> String {
-        let words = (self.step.words)(&project.settings);
-        match self.step.about {
-            About::Epoch | About::Later if !words.is_empty() => {
-                format!("{words} {}", project.epochs[self.epoch].name)
-            }
-            _ => words.to_owned(),
-        }
+    /// What a reader is told that it belongs to: to a phase, of several later epochs to that of each; `None` where it
+    /// counts as part of the task before it.
+    pub fn words(&self, project: &Project) -> Option<String> {
+        let phase = self.step.phase?;
+        let words = phase.words(project.settings.report.language);
+        let is_of_pair = matches!(phase, Phase::Match | Phase::Measure | Phase::Compare);
+        Some(match is_of_pair && project.epochs.len() > 2 {
+            true => format!("{words} ({})", project.epochs[self.epoch].name),
+            false => words.to_owned(),
+        })
     }
 
     /// The tasks that come first; in place of one that the project does not have those that it would need.

@@ -34,8 +34,9 @@ where
     type Output = ();
 
     fn run(self, mut test: T, options: Options) {
-        let told = std::env::var("BOLERO_RANDOM_ITERATIONS").ok();
-        for number in 0..told.map_or(INPUTS, |text| text.parse().unwrap()) {
+        let told = |name: &str| std::env::var(name).ok().map(|text| text.parse::<u64>().unwrap());
+        let first = told("BOLERO_RANDOM_SEED").unwrap_or(0);
+        for number in first..first + told("BOLERO_RANDOM_ITERATIONS").unwrap_or(INPUTS) {
             let mut bytes = vec![0; CHOICES];
             ChaCha8Rng::seed_from_u64(number).fill_bytes(&mut bytes);
             if let Err(error) = test.test(&mut Bytes::new(&bytes, &options)) {

@@ -1,9 +1,8 @@
 //! Mutated inputs of every reader: an answer or an error that names the file, never a panic, within limits of
 //! time and memory.
 //!
-//! `cargo test` tries the same few inputs each time, `BOLERO_RANDOM_ITERATIONS=100000 cargo test -p stonewise
-//! --test mutations` as many as it is told. `cargo bolero test` searches with coverage; see
-//! `docs/src/faults.md`.
+//! `cargo test` tries the same few inputs each time; `BOLERO_RANDOM_ITERATIONS` says how many instead, and
+//! `BOLERO_RANDOM_SEED` where to begin. `cargo bolero test` searches with coverage; see `CONTRIBUTING.md`.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,

@@ -115,7 +115,7 @@ impl Adjustment {
             let on_its_own_points = 0.5 * (with_field.deviance - own.deviance);
             let Inflation { all, in_face } = self.surface.inflation(stone.surface());
             let inflation = all.max(in_face);
-            equations.constant += (stone.ratio.log_ratio - on_its_own_points) / inflation;
+            equations.constant += (stone.log_ratio - on_its_own_points) / inflation;
         }
         equations
     }

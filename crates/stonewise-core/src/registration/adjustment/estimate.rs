@@ -1,23 +1,16 @@
 //! A stone's motion, and how it departs from its neighbours', with looseness averaged out.
 
-use super::candidate::Moving;
 use super::field::{Prediction, covariance_against, posterior};
 use super::observation::NormalEquations;
 use super::solution::Solution;
-use super::state::{Adjustment, Evidence, StoneState};
+use super::state::{Adjustment, StoneState};
 use super::stone_vector::StoneVector;
-use crate::switches::{is_on, switchable};
+use crate::switches::is_on;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
-use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Share of the results that intervals of 1.96 standard deviations leave outside.
-const OUTSIDE: f64 = 0.05;
 /// Probability, before its observations, that a stone beside a crack moves with the other side: cracks follow joints, and
 /// the line that stands for one cuts off the corners.
 const ACROSS: f64 = 0.1;
-/// Probability that a stone is loose if its points favour its own motion but one of its halves contradicts it: masks
-/// that took in something else on one side are taken to be twice as frequent as loose stones.
-const CONTRADICTED: f64 = 0.3;
 
 /// A stone's motion with its looseness averaged out, in its frame.
 pub(crate) struct Estimate {
@@ -26,8 +19,8 @@ pub(crate) struct Estimate {
     pub covariance: Matrix6<f64>,
     /// Covariance of the translation against what the neighbours predict, m^2.
     pub relative_covariance: Matrix3<f64>,
-    /// Probability that the stone is loose, if `covariance` is widened for it ([`widening`]); else 0.
-    pub missed: f64,
+    /// Probability with which it counts that the stone moves with the field.
+    pub p_tied: f64,
     /// Derivative of the motion with respect to the motion of the field at the stone.
     pub by_field: Matrix6<f64>,
 }
@@ -52,11 +45,9 @@ impl Case {
 impl Adjustment {
     /// A stone's motion about the common motion.
     ///
-    /// Where the stone is not followed on its own, it moves with its neighbours, and its covariance is
-    /// widened for the chance that it does not ([`widening`]). If its observations contradict each other, it moves with
-    /// its neighbours, and its covariance allows for its own motion. Otherwise mean and covariance are those of the
-    /// mixture of three cases: it moves with the field, it is loose, or its clouds show it at a wrong place, and
-    /// only photos and neighbours say where it is. Beside a crack, the field is a mixture of that of either side.
+    /// Where the stone is not followed on its own, it moves with its neighbours. Otherwise mean and covariance are those
+    /// of the mixture of two cases: it moves with the field, or it is loose. Beside a crack, the field is a mixture of
+    /// that of either side.
     ///
     /// `shared`: variances of errors that a stone's points share, against its neighbours; they are in the
     /// relative covariance. `across_m`: by how much the stones beyond a crack beside it moved more, in its frame.
@@ -104,36 +95,18 @@ impl Adjustment {
                 ]
             }
         };
-        let with_neighbours = Estimate::of(&tied);
-
-        let p_loose = self.p_loose(stone);
         let Some(at_own) = equations.on_own.as_ref().filter(|_| stone.on_own.is_some()) else {
-            let factor = widening(p_loose);
-            return Estimate {
-                covariance: with_neighbours.covariance * factor,
-                relative_covariance: with_neighbours.relative_covariance * factor,
-                missed: p_loose,
-                ..with_neighbours
-            };
+            return Estimate::of(&tied, 1.0);
         };
-        let p_wrong = stone.p_wrong();
-        let p_tied = 1.0 - p_loose - p_wrong;
-        let photos = self.observed_by_photos(i, Moving::WithField);
-
-        let without_clouds = photos.unwrap_or_else(NormalEquations::nothing);
+        let p_tied = 1.0 - self.p_loose(stone);
         let scaled = |case: Case| Case {
             probability: p_tied * case.probability,
             ..case
         };
         let mut cases: Vec<Case> = tied.into_iter().map(scaled).collect();
         let loose = case(prediction, at_own, &self.prior.loose_variances(), 0.0);
-        let wrong = case(prediction, &without_clouds, &own, slide_m2);
-        cases.extend([loose.of_probability(p_loose), wrong.of_probability(p_wrong)]);
-        let mixture = Estimate::of(&cases);
-        match stone.evidence {
-            Evidence::Contradictory => mixture.about(with_neighbours),
-            Evidence::TooWeak | Evidence::Decides => mixture,
-        }
+        cases.push(loose.of_probability(1.0 - p_tied));
+        Estimate::of(&cases, p_tied)
     }
 
     /// By how much the stones beyond a crack beside each stone moved more than it, in its frame; `None` for a stone with
@@ -157,19 +130,18 @@ impl Adjustment {
     }
 
     /// Probability that a stone is loose; where its own observations are too weak to tell, what is expected of any
-    /// stone, and where they contradict each other, [`CONTRADICTED`].
+    /// stone.
     pub fn p_loose(&self, stone: &StoneState) -> f64 {
-        match stone.evidence {
-            Evidence::TooWeak => self.prior.loose.share,
-            Evidence::Contradictory => CONTRADICTED,
-            Evidence::Decides => (1.0 - stone.p_with_field) * (1.0 - stone.doubt),
+        match stone.decides {
+            true => 1.0 - stone.p_with_field,
+            false => self.prior.loose.share,
         }
     }
 }
 
 impl Estimate {
-    /// Mean and covariance over these cases.
-    fn of(cases: &[Case]) -> Self {
+    /// Mean and covariance over these cases; `p_tied`: probability of those with the field.
+    fn of(cases: &[Case], p_tied: f64) -> Self {
         let mut mean = StoneVector::zeros();
         for case in cases {
             mean = mean + case.mean.scaled(case.probability);
@@ -178,7 +150,7 @@ impl Estimate {
             mean,
             covariance: Matrix6::zeros(),
             relative_covariance: Matrix3::zeros(),
-            missed: 0.0,
+            p_tied,
             by_field: Matrix6::zeros(),
         };
         for case in cases {
@@ -191,17 +163,6 @@ impl Estimate {
         }
         sum
     }
-
-    /// The mean of another estimate, with the second moments of this one about it as covariance.
-    fn about(self, other: Self) -> Self {
-        let apart = *(self.mean - other.mean).unknowns();
-        let between = apart * apart.transpose();
-        Self {
-            covariance: self.covariance + between,
-            relative_covariance: self.relative_covariance + between.fixed_view::<3, 3>(0, 0),
-            ..other
-        }
-    }
 }
 
 /// Derivative of a stone's motion with respect to the field's motion. W are the variances of the stone's own
@@ -212,20 +173,6 @@ pub(crate) fn by_field(equations: &NormalEquations, own: &[f64; 6]) -> Matrix6<f
     (Matrix6::identity() + own * equations.information)
         .try_inverse()
         .unwrap_or_else(Matrix6::identity)
-}
-
-/// Factor on the covariance of a stone that moves with its neighbours, for the small probability `p_loose`
-/// that it does not: 1.96 standard deviations then hold the motion in 95 of 100 cases even if they miss every
-/// loose one.
-///
-/// Stones of a larger probability than nine tenths of what intervals leave outside are followed on their own;
-/// the factor grows no further there.
-pub(crate) fn widening(p_loose: f64) -> f64 {
-    switchable!("widening", 1.0);
-    let missed = p_loose.clamp(0.0, 0.9 * OUTSIDE);
-    let outside = (OUTSIDE - missed) / (1.0 - missed);
-    let quantile = |outside: f64| Normal::standard().inverse_cdf(1.0 - 0.5 * outside);
-    (quantile(outside) / quantile(OUTSIDE)).powi(2)
 }
 
 #[cfg(test)]
@@ -319,23 +266,10 @@ mod tests {
         let added = (with.covariance - without.covariance)
             .fixed_view::<3, 3>(0, 0)
             .into_owned();
-        let factor = widening(with.missed);
-        let expected = across_m * across_m.transpose() * (0.09 * factor);
+        let expected = across_m * across_m.transpose() * 0.09;
         assert!(
             (added - expected).norm() < 1e-6 * expected.norm(),
             "{added} {expected}"
         );
-    }
-
-    #[test]
-    fn widened_intervals_hold_their_share_of_a_mixture() {
-        let law = Normal::standard();
-        for p_loose in [0.0, 1e-4, 0.01, 0.03, 0.045] {
-            let reach = law.inverse_cdf(0.975) * widening(p_loose).sqrt();
-            let held = (1.0 - p_loose) * (1.0 - 2.0 * law.sf(reach));
-            assert!((held - 0.95).abs() < 1e-9, "{p_loose}: {held}");
-        }
-        assert!((widening(0.0) - 1.0).abs() < 1e-12);
-        assert_eq!(widening(0.5), widening(0.045));
     }
 }

@@ -72,9 +72,9 @@ impl<'a, S: PairSource> Run<'a, S> {
         self.adjustment.forget_swings();
     }
 
-    /// Gives up on stones that still move, see [`Adjustment::give_up_on_moving`].
-    pub fn give_up_on_moving(&mut self) -> bool {
-        self.adjustment.give_up_on_moving()
+    /// Returns true if most stones no longer move, see [`Adjustment::most_are_settled`].
+    pub fn most_are_settled(&self) -> bool {
+        self.adjustment.most_are_settled()
     }
 
     /// Parts the wall along its most significant crack, where it has one and fewer than `most`; whether it
@@ -116,11 +116,6 @@ impl<'r, 'a, S: PairSource> Iteration<'r, 'a, S> {
         self.0.adjustment.estimate_noise(&self.0.points.sample);
     }
 
-    /// Marks the roughness of every stone to be estimated at its next evaluation.
-    pub fn mark_roughness_due(&mut self) {
-        self.0.adjustment.mark_roughness_due();
-    }
-
     /// Evaluates the points of all stones that moved since they were last evaluated.
     pub fn evaluate(self) -> Result<Evaluated<'r, 'a, S>, AdjustError<S::Error>> {
         self.0.adjustment.evaluate(&self.0.points)?;
@@ -132,13 +127,6 @@ impl<'r, 'a, S: PairSource> Iteration<'r, 'a, S> {
 pub(super) struct Evaluated<'r, 'a, S>(&'r mut Run<'a, S>);
 
 impl<'r, 'a, S: PairSource> Evaluated<'r, 'a, S> {
-    /// Returns stones from false optima to where their surroundings moved, and evaluates them there.
-    pub fn restart(self) -> Result<Self, AdjustError<S::Error>> {
-        self.0.adjustment.restart(&self.0.points)?;
-        self.0.adjustment.evaluate(&self.0.points)?;
-        Ok(self)
-    }
-
     /// Tries stones far from the field's motion, and evaluates them at the best place found, from which they are
     /// followed.
     pub fn probe(self) -> Result<Self, AdjustError<S::Error>> {

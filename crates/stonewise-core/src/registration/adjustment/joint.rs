@@ -1,12 +1,12 @@
 //! The joint distribution of the motions, from the last solution.
 
 use super::candidate::Moving;
-use super::estimate::{Estimate, widening};
+use super::estimate::Estimate;
 use super::field::{information, stone_from_field};
 use super::joint_motions::{JointMotions, JointStone, Pull};
 use super::octaves::Octaves;
 use super::solution::Solution;
-use super::state::{Adjustment, Evidence};
+use super::state::Adjustment;
 use crate::linalg::{root, without_negative};
 use crate::stone::{MotionFailure, PairResult};
 use nalgebra::{Matrix3, Vector6};
@@ -33,11 +33,7 @@ pub(super) fn joint_motions(
         let mut translation = estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned();
         // A slide of a single stone in the face belongs to its motion, not to the shape of the wall.
         let slide_m2 = adjustment.undetected_slide_m(i).powi(2);
-        let share = match estimate.missed > 0.0 {
-            true => widening(estimate.missed),
-            false => 1.0 - adjustment.p_loose(&adjustment.stones[i]),
-        };
-        (0..2).for_each(|k| translation[(k, k)] -= share * slide_m2);
+        (0..2).for_each(|k| translation[(k, k)] -= estimate.p_tied * slide_m2);
         let translation = in_world(&translation);
         let field = by_field * solution.field.inverse.diagonal[i] * by_field.transpose();
         let mut own = without_negative(&(translation - field));
@@ -60,9 +56,7 @@ pub(super) fn joint_motions(
             face_from_world: frame,
             body: results[i].body,
             // Nor is a stone firm whose clouds show it elsewhere, whether they are right or not.
-            is_loose: motion.loose
-                || adjustment.stones[i].moving() == Moving::OnOwn
-                || adjustment.stones[i].evidence == Evidence::Contradictory,
+            is_loose: motion.loose || adjustment.stones[i].moving() == Moving::OnOwn,
             displacement: motion.displacement,
             by_field,
             own,

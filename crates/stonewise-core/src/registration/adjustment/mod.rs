@@ -25,14 +25,13 @@ pub(crate) mod observation;
 mod octaves;
 mod outcome;
 mod params;
-mod partial_view;
 mod phases;
-mod restart;
 mod significance;
 mod solution;
 mod state;
 mod step;
 pub(crate) mod stone_vector;
+mod surroundings;
 mod survey;
 #[cfg(test)]
 pub(super) mod testing;

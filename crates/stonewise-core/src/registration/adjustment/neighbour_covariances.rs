@@ -1,6 +1,6 @@
 //! Covariances of the motions of neighbours relative to each other.
 
-use super::estimate::{Estimate, widening};
+use super::estimate::Estimate;
 use super::field::{Edge, Matrix9, stone_from_field};
 use super::octaves::Octaves;
 use super::solution::Solution;
@@ -51,12 +51,11 @@ pub(crate) fn neighbour_covariances(
         let [a, b] = [measured[edge.low].as_ref()?, measured[edge.high].as_ref()?];
         let between = between([a, b], &solution.field.inverse.edges[k].transpose());
         let spread = a.translation + b.translation - between - between.transpose();
-        let both_missed = a.estimate.missed + b.estimate.missed;
         let mut stones = [edge.low, edge.high].map(|i| results[i].first);
         stones.sort_unstable();
         Some(NeighbourCovariance {
             stones,
-            covariance: without_negative(&spread) * (widening(both_missed) * tails)
+            covariance: without_negative(&spread) * tails
                 + a.octave
                 + b.octave
                 + a.least_photo_error
@@ -74,7 +73,6 @@ struct Measured<'a> {
     estimate: &'a Estimate,
     face_from_world: &'a Matrix3<f64>,
     photos: Option<PhotoPart<'a>>,
-    /// Covariance of the translation, not widened for the chance that the stone is loose.
     translation: Matrix3<f64>,
     /// Covariance of the shortest octave of the errors that its points share.
     octave: Matrix3<f64>,
@@ -94,7 +92,7 @@ impl<'a> Measured<'a> {
         let face_from_world = &adjustment.prior.graph.nodes[i].face_from_world;
         let in_world = |covariance: &Matrix3<f64>| face_from_world.transpose() * covariance * face_from_world;
         let photos = adjustment.photo_part(i);
-        let translation = estimate.covariance.fixed_view::<3, 3>(0, 0) / widening(estimate.missed);
+        let translation = estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned();
         let of_photos = |covariance: &dyn Fn(&PhotoPart) -> Matrix3<f64>| {
             in_world(&photos.as_ref().map_or_else(Matrix3::zeros, covariance))
         };
@@ -180,7 +178,7 @@ mod tests {
             mean: StoneVector::from(Vector6::zeros()),
             covariance: Matrix6::zeros(),
             relative_covariance: Matrix3::zeros(),
-            missed: 0.0,
+            p_tied: 1.0,
             by_field: by_field(
                 &NormalEquations {
                     information,

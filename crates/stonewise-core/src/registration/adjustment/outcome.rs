@@ -1,6 +1,6 @@
 //! From the adjusted stones to one row per pair, with tests and uncertainties.
 
-use super::bodies::{bodies, refuse_unconfirmed};
+use super::bodies::bodies;
 use super::breaks::find_breaks;
 use super::candidate::Moving;
 use super::covered::{covered, leave_out_covered};
@@ -31,8 +31,6 @@ const BAD_CELLS: usize = 2;
 /// The share in place of [`BAD_SHARE`] where the stone is probably loose: at its own optimum, remaining disagreement
 /// means a wrong mask.
 const BAD_SHARE_LOOSE: f64 = 0.2;
-/// Distance within the face that the joints around a stone leave it at most, metres: half a course of small bricks.
-const ROOM_M: f64 = 0.04;
 /// Sum of 4^-k: what all octaves of length together leave in the mean over the wall, in variances of one.
 const OCTAVES_IN_MEAN: f64 = 4.0 / 3.0;
 /// Information that keeps rotations solvable where no point determines them; far below any that counts.
@@ -90,7 +88,6 @@ impl Found {
         let poses = octaves.of_poses(adjustment);
         let mut results = results(adjustment, solution, &tested, &estimates, (&octaves, &poses));
         leave_out_covered(&covered, &mut results);
-        refuse_unconfirmed(adjustment, &mut results);
         Self {
             breaks: find_breaks(adjustment, &solution.field.state, |i| tested[i].is_loose),
             neighbours: neighbour_covariances(adjustment, solution, &results, &estimates, (&octaves, &poses)),
@@ -167,7 +164,7 @@ fn results(
                         estimate,
                         (&shared, octaves, poses),
                     );
-                    observable(motion, adjustment.params.max_sd_m).and_then(|m| reachable(adjustment, i, m))
+                    observable(motion, adjustment.params.max_sd_m)
                 }
             },
         })
@@ -187,17 +184,6 @@ fn observable(motion: StoneMotion, max_sd_m: f64) -> Result<StoneMotion, MotionF
         return Err(MotionFailure::Unobservable { direction });
     }
     Ok(motion)
-}
-
-/// Refuses a motion within the face farther than the joints around a stone leave room, unless photos show it: on a smooth
-/// face the points slide to wherever they happen to fit.
-fn reachable(adjustment: &Adjustment, i: usize, motion: StoneMotion) -> Result<StoneMotion, MotionFailure> {
-    let face_from_world = &adjustment.prior.graph.nodes[i].face_from_world;
-    let slid_m = (face_from_world * motion.relative).xy().norm();
-    match is_on("room") && slid_m > ROOM_M && !adjustment.is_in_photos(i) {
-        true => Err(MotionFailure::Disagreement),
-        false => Ok(motion),
-    }
 }
 
 /// Why a stone has no motion.
@@ -222,7 +208,7 @@ fn failure(adjustment: &Adjustment, i: usize) -> Option<MotionFailure> {
     if e.overlap < params.min_overlap || disagrees {
         return Some(MotionFailure::Disagreement);
     }
-    stone.swings.then_some(MotionFailure::NotConverged)
+    stone.moves.then_some(MotionFailure::NotConverged)
 }
 
 /// Whether more than a share of a stone's cells shows two surfaces; `inflation`: factor on the expected

@@ -52,11 +52,6 @@ impl<'a, S: PairSource> Surveyed<'a, S> {
             let Some(mut iteration) = run.begin() else { break };
             if round % NOISE_EVERY == 0 {
                 iteration.estimate_noise();
-                // In the first round the epochs are not aligned, so the usual roughness, to which each stone's is
-                // relative, is still wrong by a factor.
-                if round > 0 {
-                    iteration.mark_roughness_due();
-                }
             }
             let mut evaluated = iteration.evaluate()?;
             evaluated.update_components()?;
@@ -70,15 +65,13 @@ impl<'a, S: PairSource> Surveyed<'a, S> {
 pub(super) struct Aligned<'a, S>(Run<'a, S>);
 
 impl<'a, S: PairSource> Aligned<'a, S> {
-    /// Estimates noise and roughness for good, returns stones from false optima, and tries stones far from the field's
-    /// motion.
+    /// Estimates the noise for good, and tries stones far from the field's motion.
     pub fn probe(self) -> Phase<Probed<'a, S>, S> {
         let mut run = self.0;
         run.set_effort(Effort::Weighing);
         if let Some(mut iteration) = run.begin() {
             iteration.estimate_noise();
-            iteration.mark_roughness_due();
-            let evaluated = iteration.evaluate()?.restart()?.probe()?;
+            let evaluated = iteration.evaluate()?.probe()?;
             evaluated.solve_and_reweight()?.step();
         }
         Ok(Probed(run))
@@ -136,7 +129,7 @@ impl<'a, S: PairSource> Weighed<'a, S> {
                 return Ok(Settled { run, converged: true });
             }
         }
-        let converged = is_begun && run.give_up_on_moving();
+        let converged = is_begun && run.most_are_settled();
         Ok(Settled { run, converged })
     }
 }

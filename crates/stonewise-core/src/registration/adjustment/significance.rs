@@ -3,7 +3,7 @@
 use super::field::{Prediction, posterior};
 use super::observation::NormalEquations;
 use super::solution::Solution;
-use super::state::{Adjustment, Evidence};
+use super::state::Adjustment;
 use crate::statistics::chi_square_p;
 
 /// A stone tested against its neighbours.
@@ -24,10 +24,7 @@ pub(crate) fn test_stones(adjustment: &Adjustment, solution: &Solution) -> Vec<T
     let p_error: Vec<Option<f64>> = adjustment
         .stones
         .iter()
-        .map(|s| {
-            let is_candidate = s.on_own.is_some() && s.evidence != Evidence::Contradictory;
-            is_candidate.then(|| 1.0 - adjustment.p_loose(s))
-        })
+        .map(|s| s.on_own.is_some().then(|| 1.0 - adjustment.p_loose(s)))
         .collect();
     let loose = within_error_rate(&p_error, adjustment.params.false_discovery_rate);
     p_values(adjustment, solution)

@@ -7,8 +7,7 @@ use super::field::{
     probabilities_with_field, reweight_ties, solve,
 };
 use super::observation::NormalEquations;
-use super::partial_view::estimated_rate;
-use super::state::{Adjustment, Evidence, StoneState};
+use super::state::Adjustment;
 use crate::progress::{Interrupted, Progress};
 use crate::switches::switchable;
 use nalgebra::{Matrix3, Vector3};
@@ -242,60 +241,31 @@ impl Adjustment {
     fn reweight_stones(&mut self, equations: &[StoneEquations], field: &Field) {
         let problem = self.problem(equations.iter().map(|e| &e.with_field));
         let on_own: Vec<Option<&NormalEquations>> = equations.iter().map(|e| e.on_own.as_ref()).collect();
-        let stones = 0..self.stones.len();
-        let shares: Vec<f64> = stones.map(|i| self.leaving_share(i)).collect();
         let shared = self.shared_variances(1.0);
-        let probabilities = probabilities_with_field(&problem, &on_own, field, &shared, &shares);
+        let probabilities = probabilities_with_field(&problem, &on_own, field, &shared);
         for (stone, p) in self.stones.iter_mut().zip(probabilities) {
             stone.p_with_field = p;
         }
         self.return_to_field(equations, field);
-        let predictions = field.from_others.par_iter().enumerate();
-        let doubts: Vec<f64> = predictions
-            .map(|(i, prediction)| self.doubt(i, prediction))
-            .collect();
-        for (stone, doubt) in self.stones.iter_mut().zip(doubts) {
-            stone.doubt = doubt;
-        }
-        let decided = || self.stones.iter().filter(|s| s.evidence == Evidence::Decides);
-        let wrong = |s: &StoneState| (s.info.hidden, s.p_wrong());
-        self.wrong_rate = estimated_rate(decided().map(wrong));
-        self.prior.loose.share = estimated_share(self.params.loose_share, decided().map(|s| self.p_loose(s)));
+        let decided = self.stones.iter().filter(|s| s.decides);
+        self.prior.loose.share = estimated_share(self.params.loose_share, decided.map(|s| self.p_loose(s)));
     }
 
-    /// Probability that the clouds are wrong about a stone, if they show it away from its neighbours; none where
-    /// its photos show that it left them, too.
-    fn doubt(&self, i: usize, prediction: &Prediction) -> f64 {
-        let wrong = self.wrong_share(i);
-        if wrong == 0.0 || self.photos_show_own_motion(i, prediction) {
-            return 0.0;
-        }
-        wrong / (wrong + self.prior.loose.share)
-    }
-
-    /// Returns stones to the field whose own optimum shows no motion: those whose points barely constrain it
-    /// (few noisy points have optima far away), and those of which one half contradicts it, unless photos
-    /// show it.
+    /// Returns stones to the field whose points barely constrain their motion: few noisy points have optima far away.
     fn return_to_field(&mut self, equations: &[StoneEquations], field: &Field) {
         let own = self.prior.loose_variances();
-        let evidence = |(i, (equations, prediction)): (usize, (&StoneEquations, &Prediction))| {
+        let decides = |(equations, prediction): (&StoneEquations, &Prediction)| {
             let at_optimum = equations.on_own.as_ref().unwrap_or(&equations.with_field);
             let loose = posterior(at_optimum, prediction, &own);
             let covariance = loose.covariance.fixed_view::<3, 3>(0, 0).into_owned();
             let largest_m = covariance.symmetric_eigenvalues().max().sqrt();
-            let is_contradicted =
-                || self.stones[i].ratio.is_contradicted && !self.photos_show_own_motion(i, prediction);
-            match () {
-                () if largest_m > UNCERTAIN_SHARE * self.prior.loose.move_m => Evidence::TooWeak,
-                () if is_contradicted() => Evidence::Contradictory,
-                () => Evidence::Decides,
-            }
+            largest_m <= UNCERTAIN_SHARE * self.prior.loose.move_m
         };
-        let stones = equations.par_iter().zip(&field.from_others).enumerate();
-        let found: Vec<Evidence> = stones.map(evidence).collect();
-        for (stone, evidence) in self.stones.iter_mut().zip(found) {
-            stone.evidence = evidence;
-            if evidence != Evidence::Decides {
+        let stones = equations.par_iter().zip(&field.from_others);
+        let found: Vec<bool> = stones.map(decides).collect();
+        for (stone, decides) in self.stones.iter_mut().zip(found) {
+            stone.decides = decides;
+            if !decides {
                 stone.p_with_field = 1.0;
             }
         }
@@ -305,7 +275,6 @@ impl Adjustment {
 #[cfg(test)]
 mod tests {
     use super::super::observation::photo::{BiasWeights, PhotoModel, PoseInfluence, StonePhotos};
-    use super::super::significance::test_stones;
     use super::super::survey::Points;
     use super::super::testing::{COLUMNS, begun, wall};
     use super::*;
@@ -362,105 +331,6 @@ mod tests {
         let (still, moved) = (Vector3::zeros(), Vector3::new(0.0, 0.008, 0.004));
         assert!(is_parted(moved, moved));
         assert!(!is_parted(still, moved));
-    }
-
-    #[test]
-    fn probabilities_are_finite_where_the_clouds_are_surely_wrong() {
-        let source = MemoryPairs::new(wall(5, [0.001; 2], |_| Vector3::zeros()));
-        let (mut adjustment, points) = begun(&source);
-        adjustment.estimate_noise(&points.sample);
-        adjustment.wrong_rate = 1.0;
-        for (stone, hidden) in [(20, 0.99), (21, 1.0)] {
-            adjustment.stones[stone].info.hidden = hidden;
-            assert_eq!(adjustment.leaving_share(stone), 0.5);
-        }
-        let solution = solved(&mut adjustment, &points);
-        assert!(adjustment.is_finite(&solution.field));
-        // Their points show that they move with the field.
-        assert!((20..=21).all(|i| adjustment.stones[i].p_with_field > 0.5));
-        adjustment.stones[20].p_with_field = f64::NAN;
-        assert!(!adjustment.is_finite(&solution.field));
-    }
-
-    #[test]
-    fn a_stone_of_which_one_epoch_shows_little_is_not_called_loose_by_its_clouds_alone() {
-        let moved = Vector3::new(0.0, 0.015, 0.0);
-        let motion = |k| moved * f64::from(u8::from(k == 20));
-        let source = MemoryPairs::new(wall(5, [0.001; 2], motion));
-        let [seen, hidden] = [0.0, 0.7].map(|hidden| {
-            let (mut adjustment, points) = begun(&source);
-            adjustment.stones[20].info.hidden = hidden;
-            adjustment.estimate_noise(&points.sample);
-            let mut last = None;
-            for _ in 0..8 {
-                let solution = solved(&mut adjustment, &points);
-                adjustment.step(&solution);
-                last = Some(solution);
-            }
-            let estimate = adjustment.estimate(20, &last.unwrap(), &adjustment.shared_variances(1.0), None);
-            let along = estimate.mean + adjustment.prior.common_in(20);
-            let sd = estimate.covariance[(0, 0)].sqrt();
-            let p_loose = adjustment.p_loose(&adjustment.stones[20]);
-            (along.translation().x.abs(), sd, p_loose)
-        });
-        let (along, sd, p_loose) = seen;
-        assert!(
-            (along - 0.015).abs() < 5e-4 && sd < 1e-3 && p_loose > 0.95,
-            "{seen:?}"
-        );
-        // A loose stone and clouds at a wrong place are about as probable: the interval holds either.
-        let (along, sd, p_loose) = hidden;
-        assert!((0.2..0.9).contains(&p_loose), "{hidden:?}");
-        assert!(
-            (along - 0.015).abs() < 1.96 * sd && along < 1.96 * sd,
-            "{hidden:?}"
-        );
-    }
-
-    #[test]
-    fn the_interval_of_a_stone_one_half_of_which_contradicts_its_own_motion_holds_both() {
-        let torn = 20;
-        let moved = Vector3::new(0.0, 0.015, 0.0);
-        let source = MemoryPairs::new(wall(5, [0.001; 2], |k| {
-            moved * f64::from(u8::from(k as usize == torn))
-        }));
-        let (mut adjustment, points) = begun(&source);
-        adjustment.estimate_noise(&points.sample);
-        for _ in 0..8 {
-            let solution = solved(&mut adjustment, &points);
-            adjustment.step(&solution);
-        }
-        adjustment.evaluate(&points).unwrap();
-        adjustment.stones[torn].ratio.is_contradicted = true;
-        let equations = adjustment.equations();
-        let field = adjustment.solve_and_reweight(&equations).unwrap();
-        let solution = Solution { equations, field };
-
-        let stone = &adjustment.stones[torn];
-        assert_eq!(stone.evidence, Evidence::Contradictory);
-        assert_eq!(adjustment.p_loose(stone), 0.3);
-        let estimate = adjustment.estimate(torn, &solution, &adjustment.shared_variances(1.0), None);
-        let along = (estimate.mean + adjustment.prior.common_in(torn)).translation().x;
-        let sd = estimate.covariance[(0, 0)].sqrt();
-        // It stays with its neighbours; the second moment of 15 mm with this probability.
-        assert!(along.abs() < 5e-4, "{along}");
-        assert!((sd - 0.015 * 0.3_f64.sqrt()).abs() < 5e-4, "{sd}");
-        assert!(1.96 * sd > 0.015, "{sd}");
-
-        // However many other stones are loose for certain, it is not called loose.
-        for (i, other) in adjustment.stones.iter_mut().enumerate() {
-            if i == torn {
-                continue;
-            }
-            other.on_own = Some(other.with_field.clone());
-            other.evidence = Evidence::Decides;
-            other.p_with_field = 0.0;
-            other.doubt = 0.0;
-        }
-        let called = test_stones(&adjustment, &solution);
-        let called: Vec<usize> = (0..called.len()).filter(|i| called[*i].is_loose).collect();
-        assert_eq!(called.len(), adjustment.stones.len() - 1);
-        assert!(!called.contains(&torn));
     }
 
     #[test]

@@ -6,7 +6,6 @@ use super::field::{Field, Posterior, posterior};
 use super::solution::Solution;
 use super::state::Adjustment;
 use super::stone_vector::StoneVector;
-use crate::switches::is_on;
 use rayon::prelude::*;
 
 /// One stone in this many may still swing between two optima of its own when the adjustment has settled.
@@ -14,13 +13,10 @@ const RESTLESS: usize = 50;
 /// A stone's own optimum is followed once its points make it this many times more probably loose than it was without
 /// them.
 const SUSPECT: f64 = 1.5;
-/// A stone whose last step exceeds this many standard deviations of its motion swings between two optima:
-/// neither is its motion.
-const SWINGING: f64 = 1.0;
 /// A step within this share of its standard deviation no longer matters.
 const SETTLED: f64 = 0.01;
-/// Where no iteration is left, a stone whose last step stayed within this share of its standard deviation has
-/// a motion: what is missing does not change its interval.
+/// A stone whose last step stayed within this share of its standard deviation has a motion: what is missing does not
+/// change its interval.
 const NEARLY_SETTLED: f64 = 0.1;
 /// Where no iteration is left, the wall has converged if at most one stone in this many has not: those have no motion.
 const UNSETTLED: usize = 10;
@@ -45,19 +41,14 @@ impl Adjustment {
             let with_field = limits.follow(&mut self.stones[i].with_field, tied, &origin, p);
             let on_own = self.step_on_own(i, &solution.equations[i], &solution.field);
             restless += usize::from(with_field.counts) + usize::from(on_own.counts);
-            self.stones[i].swings = is_on("swings") && (with_field.swings || on_own.swings);
             self.stones[i].moves = with_field.moves || on_own.moves;
         }
         restless * RESTLESS <= self.stones.len()
     }
 
-    /// Gives up on stones that still move, for no iteration is left; whether all others are enough.
-    pub fn give_up_on_moving(&mut self) -> bool {
-        let mut moving = 0;
-        for stone in &mut self.stones {
-            stone.swings |= stone.moves;
-            moving += usize::from(stone.swings);
-        }
+    /// Returns true if most stones no longer move. The others have no motion.
+    pub fn most_are_settled(&self) -> bool {
+        let moving = self.stones.iter().filter(|stone| stone.moves).count();
         moving * UNSETTLED <= self.stones.len()
     }
 
@@ -78,7 +69,7 @@ impl Adjustment {
         let prediction = &field.from_others[i];
         let origin = self.prior.common_in(i);
         let limits = StepLimits::of(self);
-        let expected = self.leaving_share(i);
+        let expected = self.prior.loose.share;
         let stone = &mut self.stones[i];
         let p_loose = 1.0 - stone.p_with_field;
         if let (Some(own), Some(equations)) = (&mut stone.on_own, &equations.on_own) {
@@ -95,7 +86,6 @@ impl Adjustment {
         Step {
             counts: is_suspect,
             moves: false,
-            swings: false,
         }
     }
 }
@@ -107,8 +97,6 @@ struct Step {
     counts: bool,
     /// It moves further than a small share of what its motion is uncertain.
     moves: bool,
-    /// It moves further than its motion is uncertain.
-    swings: bool,
 }
 
 /// How far a stone steps, and what step still counts.
@@ -140,7 +128,6 @@ impl StepLimits {
         Step {
             counts: step > self.tolerance_m.max(SETTLED * sd),
             moves: step > self.tolerance_m.max(NEARLY_SETTLED * sd),
-            swings: step > self.tolerance_m.max(SWINGING * sd),
         }
     }
 }

@@ -4,7 +4,7 @@ use super::shared_errors::{SharedErrors, symmetric_root};
 use crate::components::components;
 use crate::geometry::lever;
 use crate::id::StoneId;
-use crate::linalg::{BlockFactor, BlockPattern};
+use crate::linalg::{BlockFactor, BlockPattern, root};
 use crate::registration::adjustment::JointMotions;
 use crate::registration::adjustment::joint_motions::JointStone;
 use crate::registration::modes::{less_rigid, main_modes};
@@ -162,6 +162,14 @@ impl<'a> Body<'a> {
         let pair = |(low, high): &(usize, usize)| Some([*at.get(low)?, *at.get(high)?]);
         let mut shared = SharedErrors::none(stones.len());
         add_octaves(&mut shared, motions, &stones);
+        if let Some(matching) = errors.and_then(|(errors, _)| errors.matching.as_ref()) {
+            let root_of = |stone: &BodyStone| {
+                let place = number.get(&stone.id);
+                place.map_or_else(Matrix3::zeros, |&k| root(&matching.covariances[k]))
+            };
+            let roots: Vec<Matrix3<f64>> = stones.iter().map(root_of).collect();
+            add_patches(&mut shared, &stones, [0.5 * matching.length_m, 2.0], &roots);
+        }
         if motions.poses.nrows() > 0 {
             shared.add_joint(&motions.poses, stones.iter().map(|s| s.joint.by_poses.clone()));
         }
@@ -237,16 +245,27 @@ fn add_octaves(shared: &mut SharedErrors, motions: &JointMotions, stones: &[Body
     if stones.iter().all(|s| s.joint.octave.norm() == 0.0) {
         return;
     }
+    let roots: Vec<Matrix3<f64>> = stones.iter().map(|s| s.joint.octave).collect();
+    add_patches(shared, stones, [motions.step_m, motions.octaves], &roots);
+}
+
+/// Errors that stones of a patch share: from a length, over so many octaves; `roots`: of their covariances.
+fn add_patches(
+    shared: &mut SharedErrors,
+    stones: &[BodyStone],
+    [from_m, octaves]: [f64; 2],
+    roots: &[Matrix3<f64>],
+) {
     let places = stones.iter().map(|s| s.joint.place);
-    for octave in octave_patches(places, motions.step_m, motions.octaves) {
-        let row = |(stone, patch): (&BodyStone, &usize)| {
+    for octave in octave_patches(places, from_m, octaves) {
+        let row = |(root, patch): (&Matrix3<f64>, &usize)| {
             let patch = *patch;
-            let columns = stone.joint.octave * octave.share.sqrt();
+            let columns = root * octave.share.sqrt();
             (0..3)
                 .map(|c| (3 * patch + c, columns.column(c).into_owned()))
                 .collect()
         };
-        shared.add_units(3 * octave.count, stones.iter().zip(&octave.of_stones).map(row));
+        shared.add_units(3 * octave.count, roots.iter().zip(&octave.of_stones).map(row));
     }
 }
 

@@ -127,7 +127,7 @@ pub(super) struct MergedDrift {
 
 impl MergedDrift {
     /// Of a cloud from photos whose cameras are not known. Two clouds of a real wall from one bundle, taken from 10 m,
-    /// differ by 1.3 mm that change over 1 to 2 m (docs/src/method/photo-network.md), those of two bundles by more.
+    /// differ by 1.3 mm that change over 1 to 2 m (docs/src/method/epoch-errors.md), those of two bundles by more.
     pub const OF_PHOTOS: Self = Self {
         sd_m: 2e-3,
         length_m: 2.0,

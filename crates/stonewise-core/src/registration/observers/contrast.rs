@@ -7,7 +7,7 @@ use crate::geometry::FaceFrame;
 use crate::id::StoneId;
 use crate::params::{Params, Range, Ranged, with_ranges};
 use crate::registration::adjustment::observation::surface::{
-    Equations, FitOptions, Layout, LocalPair, NoiseFactors, SurfaceNoise, equations, estimate_noise,
+    Equations, FitOptions, Layout, LocalPair, SurfaceNoise, equations, estimate_noise,
 };
 use crate::registration::adjustment::stone_vector::StoneVector;
 use crate::registration::points::{PairPoints, face_spacing};
@@ -165,7 +165,7 @@ impl Comparison {
                 nearby_second: Cloud::new(stone.centroid, Vec::new()),
                 window: None,
             };
-            LocalPair::new(&pair, &frame, NoiseFactors::USUAL)
+            LocalPair::new(&pair, &frame, [1.0; 2])
         };
 
         let sight = |(s, cloud): &(&SourcePoints, Cloud)| {

@@ -1,6 +1,7 @@
 //! The error of the later epoch at all stones as one joint distribution.
 
 use super::model::Row;
+use super::network::Matching;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 /// Error of the later epoch against the reference at the stones: a linear function of a few unknowns, and what is
@@ -18,6 +19,8 @@ pub struct JointErrors {
     /// Expectation of the error of each stone's motion, which follows its neighbours, where it is taken off the
     /// motions; else zero.
     pub(crate) mean_of_motions: Vec<Vector3<f64>>,
+    /// Errors of matching, where clouds come from photos.
+    pub(crate) matching: Option<Matching>,
 }
 
 impl JointErrors {
@@ -51,6 +54,7 @@ impl JointErrors {
             rows,
             covariance,
             own,
+            matching: None,
         })
     }
 }

@@ -3,6 +3,7 @@
 use super::epoch_error::EpochErrors;
 use super::epoch_pair::EpochPair;
 use super::joint::JointErrors;
+use super::network::Matching;
 use super::scale::ScaleError;
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
 
@@ -47,6 +48,10 @@ impl EpochErrors {
         }
         if let Some(joint) = &mut self.joint {
             joint.add(&columns, &means);
+            joint.matching = match pair.has_unknown_photos {
+                true => Some(Matching::usual(pair.stones.len())),
+                false => pair.network.and_then(|network| network.matching(pair.stones)),
+            };
         }
     }
 }

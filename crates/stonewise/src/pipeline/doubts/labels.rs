@@ -1,17 +1,16 @@
 //! Doubts about where the stones are.
 
+use super::check::Check;
 use super::fit::Fit;
+use super::rules::{AGREED, IN_PLACE};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::offsets::{LabelOffset, LabelOffsets};
 use crate::texts::notices::{STONES_MISSED, STONES_MISSED_BY_VOTES};
-use crate::texts::{BESIDE, BESIDE_COMPARED, Message, Said, TORN};
+use crate::texts::{COMPARED, Said};
 use stonewise_core::epoch::EpochId;
 use stonewise_core::statistics::upper_median;
 use stonewise_core::stone::Stone;
 
-/// Labels that lie further than this beside the stones belong to other surfaces in the two epochs, metres: a
-/// tenth of a small stone.
-const OFFSET_M: f64 = 0.03;
 /// Labels lie beside the stones where the surface at their own place is less alike than this share of the
 /// best place's.
 const UNLIKE: f64 = 0.6;
@@ -19,16 +18,11 @@ const UNLIKE: f64 = 0.6;
 /// surface is about 0.9.
 const LIKE: f64 = 0.3;
 
-/// Median over the stones of their share of the photos' votes on their points, below which the photos
-/// disagree on where the stones are, or the detector misses stones in some photos. Cameras in one frame with the
-/// cloud gave 0.94 to 0.99 (simulated) and 0.87 (the real photos of `fountain`); a focal length wrong by a tenth
-/// gave 0.6, swapped axes gave 0.7.
-const AGREED: f64 = 0.8;
 /// Least number of stones whose median is not left to chance.
 const LEAST_STONES: usize = 8;
 
 /// Labels beside the stones: cameras and clouds do not fit each other.
-pub(super) fn beside(context: &Context, later: EpochId, offsets: &LabelOffsets) -> Vec<(String, Said)> {
+pub(super) fn beside(context: &Context, later: EpochId, offsets: &LabelOffsets) -> Vec<(String, Check)> {
     let epochs = context.project.epochs.pair(later);
     let [first, second] = epochs.map(|e| &e.name).into_array();
     // Views fit the clouds that they were made of.
@@ -36,37 +30,37 @@ pub(super) fn beside(context: &Context, later: EpochId, offsets: &LabelOffsets) 
     // The first epoch takes part in every pair.
     let of_first = offsets.first.filter(|_| of_photos && later == EpochId::at(1));
     let of_second = offsets.second.filter(|_| of_later_photos);
-    let within = [(first, &of_first), (second, &of_second)]
+    let mut checks: Vec<(String, Check)> = [(first, of_first), (second, of_second)]
         .into_iter()
-        .filter_map(|(name, offset)| Some((name.clone(), off_place(&BESIDE, offset.as_ref()?, first)?)));
-    let within: Vec<(String, Said)> = within.collect();
-    let between = || {
-        let offset = offsets
-            .between
-            .as_ref()
-            .filter(|_| of_photos && of_later_photos)?;
-        Some((second.clone(), off_place(&BESIDE_COMPARED, offset, first)?))
-    };
-    match within.is_empty() {
-        true => between().into_iter().collect(),
-        false => within,
+        .filter_map(|(name, offset)| Some((name.clone(), in_place(&offset?, "".into())?)))
+        .collect();
+    let between = offsets.between.filter(|_| of_photos && of_later_photos);
+    let compared = COMPARED.say(&[("first", format!("{first:?}").into())]);
+    let between = between.and_then(|offset| in_place(&offset, compared));
+    // Where the labels of both epochs lie on their own clouds, those of the later one may still lie on other stones.
+    if let Some(between) = between.filter(|check| check.doubt.is_some())
+        && checks.iter().all(|(_, check)| check.doubt.is_none())
+    {
+        checks.retain(|(name, _)| name != second);
+        checks.push((second.clone(), between));
     }
+    checks
 }
 
-/// An offset in words, if it is clear and large.
-fn off_place(doubt: &Message, offset: &LabelOffset, first: &str) -> Option<Said> {
-    let is_clear = offset.likeness >= LIKE && offset.likeness_unmoved < UNLIKE * offset.likeness;
-    let is_off = is_clear && offset.length_m() > OFFSET_M;
-    let [along, up] = offset.along_up_m.map(|m| format!("{:+.0}", 1e3 * m));
-    let length = format!("{:.0}", 1e3 * offset.length_m());
-    let first = format!("{first:?}");
-    let values = [
-        ("length", length.into()),
-        ("along", along.into()),
-        ("up", up.into()),
-        ("first", first.into()),
-    ];
-    is_off.then(|| doubt.say(&values))
+/// The check of an offset, if it is clear; `compared`: with what.
+fn in_place(offset: &LabelOffset, compared: Said) -> Option<Check> {
+    let is_beside = offset.likeness_unmoved < UNLIKE * offset.likeness;
+    let length_m = if is_beside { offset.length_m() } else { 0.0 };
+    let values = || {
+        let [along, up] = offset.along_up_m.map(|m| format!("{:+.0}", 1e3 * m));
+        [
+            ("length", format!("{:.0}", 1e3 * length_m).into()),
+            ("along", along.into()),
+            ("up", up.into()),
+            ("compared", compared),
+        ]
+    };
+    (offset.likeness >= LIKE).then(|| IN_PLACE.check(length_m, values))
 }
 
 /// The photos' votes on the stones of an epoch.
@@ -99,32 +93,36 @@ impl Votes {
         (seen.len() >= LEAST_STONES).then_some(votes)
     }
 
-    /// Whether a typical stone gets fewer than it should.
-    pub fn are_few(self) -> bool {
-        self.share < AGREED
-    }
-
-    /// Whether the votes suggest photos that do not fit the cloud.
-    pub fn are_torn(self, fit: Fit) -> bool {
-        let is_misfit = match fit.holds() {
-            Some(holds) => !holds,
-            None => self.best < AGREED,
+    /// Whether the votes suggest photos that do not fit the cloud; `None` where they are few, but the photos find the
+    /// stones, so that they do fit. Where that is not known, the stones that most photos show decide.
+    pub fn check(self, fit: Fit) -> Option<Check> {
+        let share = match fit.holds() {
+            Some(true) if self.are_few() => return None,
+            Some(_) => self.share,
+            None => self.share.max(self.best),
         };
-        self.are_few() && is_misfit
+        let values = || {
+            let [share, best] = self.percent();
+            [("share", share), ("best", best), ("cause", fit.cause())]
+        };
+        Some(AGREED.check(share, values))
     }
 
-    pub fn torn(self, fit: Fit) -> Said {
-        let [share, best] = self.percent();
-        TORN.say(&[("share", share), ("best", best), ("cause", fit.cause())])
+    /// Whether a typical stone gets fewer than it should.
+    fn are_few(self) -> bool {
+        !AGREED.passes(self.share)
     }
 
-    pub fn missed(self, fit: Fit) -> Said {
+    /// What is said of few votes of photos that fit the cloud.
+    pub fn missed(self, fit: Fit) -> Option<Said> {
         let [share, best] = self.percent();
         let votes = [("share", share), ("best", best)];
-        match fit.holds() {
+        let said = match fit.holds() {
             Some(_) => STONES_MISSED.say(&[votes, fit.values()].concat()),
             None => STONES_MISSED_BY_VOTES.say(&votes),
-        }
+        };
+        let fits = self.check(fit).is_none_or(|check| check.doubt.is_none());
+        (self.are_few() && fits).then_some(said)
     }
 
     fn percent(self) -> [Said; 2] {
@@ -134,6 +132,7 @@ impl Votes {
 
 #[cfg(test)]
 mod tests {
+    use super::super::check::said;
     use super::*;
     use nalgebra::{Point3, Vector3};
     use stonewise_core::id::StoneId;
@@ -160,26 +159,27 @@ mod tests {
         let votes = |stones: &[Stone]| Votes::of(stones).unwrap();
         // As few votes however many photos there are.
         let low = votes(&stones(21, 3, |i| 0.5 + 0.01 * f64::from(i)));
-        assert!(low.are_torn(UNKNOWN) && low.are_torn(NOT_FOUND));
-        let message = low.torn(NOT_FOUND);
+        assert!(said(low.check(UNKNOWN)).is_some());
+        let message = said(low.check(NOT_FOUND)).unwrap();
         assert!(
             message.english.contains("only 60 %") && message.english.contains("10 of the 100 stones"),
             "{message}"
         );
         // The photos find the stones all the same.
-        assert!(low.are_few() && !low.are_torn(FOUND));
+        assert!(low.are_few() && said(low.check(FOUND)).is_none());
+        assert!(low.missed(FOUND).is_some() && low.missed(NOT_FOUND).is_none());
         // A detector that finds a stone in n of eight photos: n eighths of the votes.
         let mut missed = Vec::new();
         for photos in 2..=8 {
             missed.extend(stones(9, photos, |_| f64::from(photos) / 8.0));
         }
-        assert!(votes(&missed).are_few() && !votes(&missed).are_torn(UNKNOWN));
-        let message = votes(&missed).missed(FOUND);
+        assert!(votes(&missed).are_few() && said(votes(&missed).check(UNKNOWN)).is_none());
+        let message = votes(&missed).missed(FOUND).unwrap();
         assert!(
             message.english.contains("62 %") && message.english.contains("100 %"),
             "{message}"
         );
-        let message = votes(&missed).missed(UNKNOWN);
+        let message = votes(&missed).missed(UNKNOWN).unwrap();
         assert!(!message.english.contains("photos find"), "{message}");
         // A few bad stones on a sound wall, a wall of one photo each, and too few stones to tell.
         assert!(!votes(&stones(21, 3, |i| if i < 9 { 0.3 } else { 0.9 })).are_few());

@@ -5,6 +5,7 @@ mod fit;
 mod labels;
 mod motions;
 mod registration;
+mod rules;
 mod scale;
 mod turn;
 
@@ -23,6 +24,7 @@ use fit::Fit;
 use labels::{Votes, beside};
 use motions::{blind, few_measured, refused, uncovered, unsettled};
 use scale::stretched;
+use std::sync::Arc;
 use stonewise_core::epoch::EpochId;
 use turn::turned;
 
@@ -37,50 +39,49 @@ pub static DOUBTS: Step = Step {
 };
 
 fn note_doubts(run: &Run, later: EpochId) -> Result<()> {
-    let (context, labelled) = (run.context, run.labelled_pair(later)?);
-    let (registered, measured) = (run.registered(later)?, run.measured(later)?);
-    note_registration(context, later, &registered, &measured.datum);
-    let epochs = context.project.epochs.pair(later);
-    let fit = Fit::of(&registered);
-    // The first epoch takes part in every pair.
-    let first_time = usize::from(later != EpochId::at(1));
-    // Views fit the clouds that they were made of.
-    let with_photos = epochs.zip(labelled).into_iter().skip(first_time);
-    for (epoch, labels) in with_photos.filter(|(epoch, _)| epoch.photos.is_some()) {
-        match Votes::of(&labels.stones) {
-            Some(votes) if votes.are_torn(fit) => {
-                context.warnings.doubt("label", &epoch.name, votes.torn(fit));
-            }
-            Some(votes) if votes.are_few() => {
-                context.warnings.notice("label", &epoch.name, votes.missed(fit));
-            }
-            _ => {}
+    let (context, registered) = (run.context, run.registered(later)?);
+    note_registration(context, later, &registered, &run.measured(later)?.datum);
+    for (epoch, votes) in votes(run, later)? {
+        if let Some(missed) = votes.missed(Fit::of(&registered)) {
+            context.warnings.notice(DOUBTS.name, epoch, missed);
         }
     }
-    for (name, message) in beside(context, later, &*run.offsets(later)?) {
-        context.warnings.doubt("label", name, message);
-    }
-    for doubt in checks(run, later)?.into_iter().filter_map(|check| check.doubt) {
-        context.warnings.doubt("register", &epochs.later.name, doubt);
+    for (epoch, check) in &*run.checks(later)? {
+        if let Some(doubt) = &check.doubt {
+            context.warnings.doubt(DOUBTS.name, epoch, doubt.clone());
+        }
     }
     Ok(())
 }
 
-/// The checks of a later epoch, as registration.json has them.
-pub fn check_records(run: &Run, later: EpochId) -> Result<Vec<CheckRecord>> {
-    Ok(checks(run, later)?.iter().map(Check::record).collect())
+impl Run<'_> {
+    /// The checks of a later epoch, each with the name of the epoch that it is about.
+    fn checks(&self, later: EpochId) -> Result<Arc<Vec<(String, Check)>>> {
+        self.once(&DOUBTS, later, || checks(self, later))
+    }
+
+    /// The checks of a later epoch as registration.json has them.
+    pub fn check_records(&self, later: EpochId) -> Result<Vec<CheckRecord>> {
+        let language = self.context.project.settings.report.language;
+        let checks = self.checks(later)?;
+        let record = |(epoch, check): &(String, Check)| check.record(epoch, language);
+        Ok(checks.iter().map(record).collect())
+    }
 }
 
-fn checks(run: &Run, later: EpochId) -> Result<Vec<Check>> {
+fn checks(run: &Run, later: EpochId) -> Result<Vec<(String, Check)>> {
     let context = run.context;
     let (registered, measured) = (run.registered(later)?, run.measured(later)?);
     let (rows, fit) = (&measured.rows, Fit::of(&registered));
+    let mut all = beside(context, later, &*run.offsets(later)?);
+    let votes = votes(run, later)?.into_iter();
+    all.extend(votes.filter_map(|(epoch, votes)| Some((epoch, votes.check(fit)?))));
     let of_motions = [
         unsettled(&registered, fit),
         few_measured(rows, fit),
         run.walls_m2(EpochId::REFERENCE)?
             .and_then(|walls_m2| uncovered(rows, walls_m2)),
-        refused(rows),
+        Some(refused(rows)),
         blind(&registered, rows, fit),
         turned(rows),
     ];
@@ -90,7 +91,23 @@ fn checks(run: &Run, later: EpochId) -> Result<Vec<Check>> {
         true => [None, None],
         false => [misregistered(context, &registered), stretched(&registered)],
     };
-    Ok(of_motions.into_iter().chain(of_epochs).flatten().collect())
+    let of_later = of_motions.into_iter().chain(of_epochs).flatten();
+    let name = &context.project.epochs[later].name;
+    all.extend(of_later.map(|check| (name.clone(), check)));
+    Ok(all)
+}
+
+/// The votes of the photos on the stones of each epoch that has photos.
+fn votes(run: &Run, later: EpochId) -> Result<Vec<(String, Votes)>> {
+    let labelled = run.labelled_pair(later)?;
+    let epochs = run.context.project.epochs.pair(later).zip(labelled).into_iter();
+    // The first epoch takes part in every pair; views fit the clouds that they were made of.
+    let with_photos = epochs
+        .skip(usize::from(later != EpochId::at(1)))
+        .filter(|(epoch, _)| epoch.photos.is_some());
+    Ok(with_photos
+        .filter_map(|(epoch, labels)| Some((epoch.name.clone(), Votes::of(&labels.stones)?)))
+        .collect())
 }
 
 /// See [`registration::misregistered`]. Where the stones aligned the epochs, nothing is claimed that surfaces off

@@ -1,75 +1,38 @@
 //! Doubts about the motions of a pair of epochs.
 
-use super::check::{Check, Rule};
+use super::check::Check;
 use super::fit::Fit;
+use super::rules::{CONFIRMED, COVERED, MEASURED, SENSITIVE, SETTLED};
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
 use crate::results::{Status, StoneRow};
-use crate::texts::{BLIND, FEW_MEASURED, NOT_CONVERGED, PART_REFUSED, Said, UNCOVERED};
+use crate::texts::Said;
 use std::collections::{BTreeMap, BTreeSet};
 use stonewise_core::stone::StoneMotion;
 
-/// Median 95 % limit of detection, in units of what spacing and noise of the points allow, beyond which
-/// something other than noise hides the motions.
-const LIMIT_EXCESS: f64 = 100.0;
-/// Part of the walls below which the measured stones say nothing about them.
-const LEAST_COVERED: f64 = 0.1;
 /// Distance from a stone within which the wall should show others, and the size of the squares that are counted, metres.
 const AROUND_M: f64 = 2.0;
 const SQUARE_M: f64 = 0.5;
-/// Stones of a part without a motion that is no mistake of single masks.
-const PART_STONES: usize = 10;
 /// Half width of a 95 % interval, in standard deviations.
 const SIGMAS_95: f64 = 1.96;
-
-/// Largest share of the stones that may still move; see the adjustment's end.
-static SETTLED: Rule = Rule {
-    message: &NOT_CONVERGED,
-    limit: 0.0,
-    source: "the adjustment ends when nine tenths of the stones have settled, or after `max_iterations`",
-    remedy: "check the masks and cameras of both epochs, or raise `max_iterations`",
-};
-static MEASURED: Rule = Rule {
-    message: &FEW_MEASURED,
-    limit: 0.5,
-    source: "half of the stones that were found in both epochs",
-    remedy: "look at the status of the stones: clouds, masks or cameras of the epochs do not fit each other",
-};
-static COVERED: Rule = Rule {
-    message: &UNCOVERED,
-    limit: LEAST_COVERED,
-    source: "a tenth of the walls around the measured stones",
-    remedy: "give photos, denser clouds, or `[views] outside` if the wall is seen from behind",
-};
-static CONFIRMED: Rule = Rule {
-    message: &PART_REFUSED,
-    limit: PART_STONES as f64,
-    source: "more neighbouring stones than mistakes of single masks explain",
-    remedy: "look at the part on site and in the clouds of both epochs",
-};
-static SENSITIVE: Rule = Rule {
-    message: &BLIND,
-    limit: LIMIT_EXCESS,
-    source: "a hundred times what spacing and noise of the points allow",
-    remedy: "check masks, cameras and overlap of the epochs",
-};
 
 /// The adjustment stopped before its motions had settled.
 pub(super) fn unsettled(registered: &Registered, fit: Fit) -> Option<Check> {
     let EstimatorRecord::Adjustment(adjustment) = &registered.estimator else {
         return None;
     };
+    let unsettled = u8::from(!adjustment.converged);
     let iterations = adjustment.iterations.to_string();
-    let doubt = (!adjustment.converged)
-        .then(|| NOT_CONVERGED.say(&[("iterations", iterations.into()), ("cause", fit.cause())]));
-    Some(SETTLED.check(f64::from(u8::from(!adjustment.converged)), doubt))
+    Some(SETTLED.check(f64::from(unsettled), || {
+        [("iterations", iterations.into()), ("cause", fit.cause())]
+    }))
 }
 
 /// Most of the stones that were found in both epochs could not be measured.
 pub(super) fn few_measured(rows: &[StoneRow], fit: Fit) -> Option<Check> {
     let matched = rows.iter().filter(|r| r.matched_id.is_some()).count();
     let measured = rows.iter().filter(|r| r.status == Status::Ok).count();
-    let doubt = (2 * measured < matched).then(|| {
+    let values = || {
         let counts = Status::ALL.iter().filter_map(|status| {
             let n = rows
                 .iter()
@@ -77,15 +40,14 @@ pub(super) fn few_measured(rows: &[StoneRow], fit: Fit) -> Option<Check> {
                 .count();
             (n > 0).then(|| format!("{n} {}", status.word()))
         });
-        let values = [
+        [
             ("measured", measured.to_string().into()),
             ("matched", matched.to_string().into()),
             ("reasons", counts.collect::<Vec<_>>().join(", ").into()),
             ("cause", fit.cause()),
-        ];
-        FEW_MEASURED.say(&values)
-    });
-    (matched > 0).then(|| MEASURED.check(measured as f64 / matched as f64, doubt))
+        ]
+    };
+    (matched > 0).then(|| MEASURED.check(measured as f64 / matched as f64, values))
 }
 
 /// The measured stones cover little of the walls that the clouds show around them; `walls_m2`: area of all walls. Farther
@@ -94,14 +56,14 @@ pub(super) fn uncovered(rows: &[StoneRow], walls_m2: f64) -> Option<Check> {
     let measured: Vec<&StoneRow> = rows.iter().filter(|r| r.status == Status::Ok).collect();
     let area_m2: f64 = measured.iter().map(|r| r.area_m2).sum();
     let walls_m2 = walls_m2.min(around_m2(&measured));
-    let doubt = (area_m2 < LEAST_COVERED * walls_m2).then(|| {
-        UNCOVERED.say(&[
+    let values = || {
+        [
             ("measured", measured.len().to_string().into()),
             ("area", Said::numbers(format!("{area_m2:.1}"))),
             ("walls", Said::numbers(format!("{walls_m2:.1}"))),
-        ])
-    });
-    (walls_m2 > 0.0).then(|| COVERED.check(area_m2 / walls_m2, doubt))
+        ]
+    };
+    (walls_m2 > 0.0).then(|| COVERED.check(area_m2 / walls_m2, values))
 }
 
 /// Area of the face around stones.
@@ -118,7 +80,7 @@ fn around_m2(stones: &[&StoneRow]) -> f64 {
 }
 
 /// A part of the wall that is too large to be a mistake of some masks has no motion because nothing confirms it.
-pub(super) fn refused(rows: &[StoneRow]) -> Option<Check> {
+pub(super) fn refused(rows: &[StoneRow]) -> Check {
     let mut parts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for row in rows.iter().filter(|r| r.status == Status::FailedDisagreement) {
         if let Some(body) = row.body_id.filter(|body| *body > 1) {
@@ -126,12 +88,12 @@ pub(super) fn refused(rows: &[StoneRow]) -> Option<Check> {
         }
     }
     let largest = parts.into_values().max_by_key(Vec::len).unwrap_or_default();
-    let doubt = (largest.len() >= PART_STONES).then(|| {
-        let values = [largest.len(), largest[0] as usize].map(|n| n.to_string().into());
-        let [stones, stone] = values;
-        PART_REFUSED.say(&[("stones", stones), ("stone", stone)])
-    });
-    Some(CONFIRMED.check(largest.len() as f64, doubt))
+    CONFIRMED.check(largest.len() as f64, || {
+        [
+            ("stones", largest.len().to_string().into()),
+            ("stone", largest[0].to_string().into()),
+        ]
+    })
 }
 
 /// Motions are far less certain than the points allow.
@@ -152,16 +114,13 @@ pub(super) fn blind(registered: &Registered, rows: &[StoneRow], fit: Fit) -> Opt
     let mut all: Vec<(f64, f64)> = measured.filter_map(ratio).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let &(excess, sd) = all.get(all.len() / 2)?;
-    let doubt = (excess > LIMIT_EXCESS).then(|| {
-        let limit = format!("{:.0}", 1e3 * SIGMAS_95 * sd);
-        let excess = format!("{excess:.0}");
-        BLIND.say(&[
-            ("limit", limit.into()),
-            ("excess", excess.into()),
+    Some(SENSITIVE.check(excess, || {
+        [
+            ("limit", format!("{:.0}", 1e3 * SIGMAS_95 * sd).into()),
+            ("excess", format!("{excess:.0}").into()),
             ("cause", fit.cause()),
-        ])
-    });
-    Some(SENSITIVE.check(excess, doubt))
+        ]
+    }))
 }
 
 #[cfg(test)]
@@ -280,14 +239,14 @@ mod tests {
             row.status = Status::FailedDisagreement;
             row.body_id = Some(2);
         }
-        let message = said(refused(&rows)).unwrap();
+        let message = said(Some(refused(&rows))).unwrap();
         let first = rows[0].stone_id;
         let part = format!("10 neighbouring stones of a part of the wall, around stone {first},");
         assert!(message.english.contains(&part), "{message}");
         // Scans alone have no photos that could contradict it.
         assert!(!message.english.contains("photo"), "{message}");
         rows[0].status = Status::Ok;
-        assert_eq!(said(refused(&rows)), None);
+        assert_eq!(said(Some(refused(&rows))), None);
     }
 
     #[test]

@@ -1,20 +1,10 @@
 //! Doubts about the registration of an epoch.
 
-use super::check::{Check, Rule};
-use crate::texts::{MISREGISTERED_EPOCH, Said};
+use super::check::Check;
+use super::rules::AGREES;
+use crate::texts::Said;
 use nalgebra::Vector3;
 use stonewise_core::registration::observers::CrossCheck;
-
-/// Probability of the difference between the registration errors with and without surfaces off the wall,
-/// below which the run is in doubt: one sound survey in a thousand.
-const MISREGISTERED: f64 = 1e-3;
-
-static AGREES: Rule = Rule {
-    message: &MISREGISTERED_EPOCH,
-    limit: MISREGISTERED,
-    source: "probability of the difference: one sound survey in a thousand",
-    remedy: "use the surfaces off the wall (`auto_stable`, `[[registration.stable]]`), or state `epoch_error_m`",
-};
 
 /// Surfaces off the wall show a registration error that differs significantly from the one found without
 /// them. An error that the project states is not questioned.
@@ -24,14 +14,15 @@ pub(super) fn misregistered(stated_m: Option<f64>, check: &CrossCheck) -> Option
     }
     let mm = |v: &Vector3<f64>| Said::list(&[v.x, v.y, v.z].map(|m| format!("{:+.1}", 1e3 * m)));
     let sd = check.covariance.diagonal().max().max(0.0).sqrt();
-    let values = [
-        ("cells", check.cells.to_string().into()),
-        ("shown", mm(&check.error)),
-        ("found", mm(&check.found)),
-        ("sd", Said::numbers(format!("{:.1}", 1e3 * sd))),
-    ];
-    let doubt = (check.p < MISREGISTERED).then(|| MISREGISTERED_EPOCH.say(&values));
-    Some(AGREES.check(check.p, doubt))
+    let values = || {
+        [
+            ("cells", check.cells.to_string().into()),
+            ("shown", mm(&check.error)),
+            ("found", mm(&check.found)),
+            ("sd", Said::numbers(format!("{:.1}", 1e3 * sd))),
+        ]
+    };
+    Some(AGREES.check(check.p, values))
 }
 
 #[cfg(test)]

@@ -1,15 +1,9 @@
 //! Doubts about the scale of an epoch.
 
-use super::check::{Check, Rule};
+use super::check::Check;
+use super::rules::SCALED;
 use crate::pipeline::steps::register::Registered;
-use crate::texts::{STRETCHED, Said};
-
-static SCALED: Rule = Rule {
-    message: &STRETCHED,
-    limit: 1.0,
-    source: "the strain that temperature (0.3 mm per metre) and the scale of the instruments explain",
-    remedy: "name a known length of each epoch in `[[distances]]`",
-};
+use crate::texts::Said;
 
 /// The wall seems to have grown or shrunk all round by more than instruments and temperature explain.
 pub(super) fn stretched(registered: &Registered) -> Option<Check> {
@@ -19,7 +13,6 @@ pub(super) fn stretched(registered: &Registered) -> Option<Check> {
         ("half_width", format!("{:.1}", 1e3 * strain.half_width)),
         ("lesser", format!("{:+.1}", 1e3 * strain.lesser)),
     ];
-    let values = values.map(|(name, value)| (name, Said::numbers(value)));
-    let doubt = (strain.excess > SCALED.limit).then(|| STRETCHED.say(&values));
-    Some(SCALED.check(strain.excess, doubt))
+    let values = || values.map(|(name, value)| (name, Said::numbers(value)));
+    Some(SCALED.check(strain.excess, values))
 }

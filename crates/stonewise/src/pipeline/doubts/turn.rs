@@ -1,18 +1,12 @@
 //! Doubts about epochs that are turned against each other.
 
-use super::check::{Check, Rule};
+use super::check::Check;
+use super::rules::SMALL_ROTATION;
 use crate::results::{Status, StoneRow};
-use crate::texts::{Said, TURNED};
+use crate::texts::Said;
 use nalgebra::Matrix3;
 use stonewise_core::geometry::{DisplacementSample, SmallMotion};
 use stonewise_core::statistics::median;
-
-static SMALL_ROTATION: Rule = Rule {
-    message: &TURNED,
-    limit: 1.0,
-    source: "the typical standard deviation of a stone, in which the error of a motion linear in the rotation is counted",
-    remedy: "register the clouds of the epoch to those of the first, with their cameras",
-};
 
 /// The doubt that the wall as a whole turned too far for displacements to be linear in the rotation, as the adjustment
 /// and the common rigid motion take them: the term of second order, |w x (w x a)| / 2 for a rotation vector w and an
@@ -37,15 +31,13 @@ pub(super) fn turned(rows: &[StoneRow]) -> Option<Check> {
     let second_order =
         |s: &DisplacementSample| turn.cross(&turn.cross(&(s.place - common.centre))).norm() / 2.0;
     let error = samples.iter().map(second_order).fold(0.0, f64::max);
-    let doubt = (error > sd).then(|| {
-        let values = [
-            ("angle", turn.norm().to_degrees()),
-            ("error", 1e3 * error),
-            ("sd", 1e3 * sd),
-        ];
-        TURNED.say(&values.map(|(name, value)| (name, Said::numbers(format!("{value:.2}")))))
-    });
-    (sd > 0.0).then(|| SMALL_ROTATION.check(error / sd, doubt))
+    let values = [
+        ("angle", turn.norm().to_degrees()),
+        ("error", 1e3 * error),
+        ("sd", 1e3 * sd),
+    ];
+    let values = || values.map(|(name, value)| (name, Said::numbers(format!("{value:.2}"))));
+    (sd > 0.0).then(|| SMALL_ROTATION.check(error / sd, values))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::output::cloud_names;
 use crate::pipeline::context::Context;
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::graph::{About, Need, Phase, Run, Step};
 use crate::pipeline::outputs::outlines::OUTLINES;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::measure::MEASURE;
@@ -21,7 +21,7 @@ use stonewise_io::cloud::{LabelColumns, PointLabel, PointMotion, write_labelled}
 /// Writes the clouds of an epoch with the stone of every point.
 pub static CLOUDS: Step = Step {
     name: "clouds",
-    words: |_| "labelled clouds of",
+    phase: Some(Phase::Write),
     about: About::Epoch,
     needs: &[
         Need::first_later(&MEASURE).when(|_, epoch| epoch.is_reference()),

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{Need, Run, Step};
+use crate::pipeline::graph::{Need, Phase, Run, Step};
 use crate::pipeline::steps::edit::EDIT;
 use crate::pipeline::steps::stone_outlines::make_outlines;
 use crate::pipeline::until::Until;
@@ -17,7 +17,7 @@ use stonewise_io::atomic::write_atomically;
 /// Writes the outlines of the reference's stones.
 pub static OUTLINES: Step = Step {
     name: "outlines",
-    words: |_| "outlines",
+    phase: Some(Phase::Find),
     needs: &[Need::same(&EDIT)],
     wanted: |until| until >= Until::Matched,
     cost: Some(|sizes, _| Cost::of(1, 2 * sizes.cloud_bytes(EpochId::REFERENCE))),

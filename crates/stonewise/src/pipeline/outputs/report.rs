@@ -9,7 +9,7 @@ use super::run_record::RECORD;
 use super::series::SERIES;
 use crate::export::write_layers;
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{Need, Step};
+use crate::pipeline::graph::{Need, Phase, Step};
 use crate::pipeline::steps::evaluate::EVALUATE;
 use crate::pipeline::until::Until;
 use crate::report::write_report;
@@ -18,7 +18,7 @@ use stonewise_core::epoch::EpochId;
 /// Writes the report. Its unit is the last of a plan, and does whatever is no unit of its own.
 pub static REPORT: Step = Step {
     name: "report",
-    words: |_| "report",
+    phase: Some(Phase::Write),
     needs: &[
         Need::same(&RECORD),
         Need::same(&EVIDENCE),

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::files::write_readable_json;
-use crate::pipeline::doubts::check_records;
+use crate::pipeline::doubts::DOUBTS;
 use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::outputs::evidence::write_tracked_stones;
 use crate::pipeline::steps::measure::MEASURE;
@@ -16,7 +16,7 @@ use stonewise_core::epoch::EpochId;
 pub static TABLES: Step = Step {
     name: "tables",
     about: About::Later,
-    needs: &[Need::same(&MEASURE)],
+    needs: &[Need::same(&MEASURE), Need::same(&DOUBTS)],
     wanted: |until| until >= Until::Registered,
     make: write_tables,
     ..Step::PLAIN
@@ -35,7 +35,7 @@ fn write_tables(run: &Run, later: EpochId) -> Result<()> {
         datum: measured.datum.clone(),
         observers: registered.epoch_errors.as_ref().map(ObserversRecord::from),
         deformation: registered.deformation.as_ref().map(DeformationRecord::from),
-        checks: check_records(run, later)?,
+        checks: run.check_records(later)?,
     };
     let name = PairFile::Registration.place(later.index());
     write_readable_json(&out.join(name), &record)?;

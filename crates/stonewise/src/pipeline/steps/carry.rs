@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::graph::{About, Need, Phase, Run, Step};
 use crate::pipeline::until::Until;
 use crate::storage::labels::DiskLabels;
 use crate::storage::step::Key;
@@ -33,7 +33,7 @@ use stonewise_core::transfer::{
 /// those of the reference in the later ones.
 pub static CARRY: Step = Step {
     name: "carry",
-    words: |_| "missed stones looked for in",
+    phase: Some(Phase::Find),
     about: About::Epoch,
     needs: &[Need::all(&JOIN), Need::reference(&CARRY)],
     wanted: |until| until >= Until::Labelled,

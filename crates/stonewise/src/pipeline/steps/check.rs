@@ -4,14 +4,14 @@ use crate::check::{Depth, Report, Verdict, check, is_about_this_machine, require
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
-use crate::pipeline::graph::{Run, Step};
+use crate::pipeline::graph::{Phase, Run, Step};
 use crate::storage::step::{Key, look_of};
 use stonewise_core::epoch::EpochId;
 
 /// A look at the survey before the work.
 pub static CHECK: Step = Step {
     name: STEP,
-    words: |_| "check of the survey",
+    phase: Some(Phase::Read),
     make: |run, _| run.checked(),
     ..Step::PLAIN
 };

@@ -11,7 +11,7 @@ use super::views::has_no_photos;
 use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::graph::{About, Need, Phase, Run, Step};
 use crate::pipeline::until::Until;
 use crate::project::Project;
 use crate::storage::labels::DiskLabels;
@@ -26,7 +26,7 @@ use stonewise_core::transfer::drop_stones;
 /// Drops stones of an epoch that one view shows and no other epoch shows better.
 pub static CONFIRM: Step = Step {
     name: STEP,
-    words: |_| "stones confirmed in",
+    phase: Some(Phase::Find),
     about: About::Epoch,
     needs: &[Need::all(&CARRY)],
     wanted: |until| until >= Until::Labelled,

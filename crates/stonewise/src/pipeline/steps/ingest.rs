@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::pipeline::context::Context;
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{About, Run, Step};
+use crate::pipeline::graph::{About, Phase, Run, Step};
 use crate::project::Epoch;
 use crate::storage::epoch_tiles::{EpochTiles, KnownMotion};
 use crate::storage::step::{Key, StepDir};
@@ -18,7 +18,7 @@ use stonewise_io::cloud::{cloud_remarks, cloud_scans};
 /// Cuts the clouds of an epoch into tiles.
 pub static INGEST: Step = Step {
     name: "ingest",
-    words: |_| "clouds of",
+    phase: Some(Phase::Read),
     about: About::Epoch,
     // Tiles are sorted in a buffer of a quarter of a gibibyte.
     cost: Some(|_, _| Cost::of(2, 256 << 20)),

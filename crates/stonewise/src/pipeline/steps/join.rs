@@ -10,7 +10,7 @@ use super::shapes::{Matches, Others, is_corrected, shapes};
 use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::graph::{About, Need, Phase, Run, Step};
 use crate::pipeline::until::Until;
 use crate::storage::labels::DiskLabels;
 use crate::storage::step::Key;
@@ -30,7 +30,7 @@ use stonewise_core::transfer::{
 /// reference.
 pub static JOIN: Step = Step {
     name: "join",
-    words: |_| "parts of stones joined in",
+    phase: Some(Phase::Find),
     about: About::Epoch,
     needs: &[Need::all(&STONES), Need::reference(&JOIN)],
     wanted: |until| until >= Until::Labelled,

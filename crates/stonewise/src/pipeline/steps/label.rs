@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::cost::{Cost, Sizes};
-use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::graph::{About, Need, Phase, Run, Step};
 use crate::pipeline::steps::ingest::{INGEST, Ingested};
 use crate::pipeline::steps::segment::{SEGMENT, Segmented};
 use crate::pipeline::steps::views::has_no_photos;
@@ -28,7 +28,7 @@ use stonewise_core::transfer::{LabelStore, TileLabels, Transfer, build_stones, t
 /// Carries the photos' labels into the points of an epoch.
 pub static LABEL: Step = Step {
     name: "label",
-    words: |_| "stones in the clouds of",
+    phase: Some(Phase::Find),
     about: About::Epoch,
     needs: &[Need::same(&INGEST), Need::same(&SEGMENT)],
     wanted: |until| until >= Until::Labelled,
@@ -40,7 +40,7 @@ pub static LABEL: Step = Step {
 /// Finds how a later epoch lies in the frame of the reference, where the project file says so.
 pub static ALIGN: Step = Step {
     name: "align",
-    words: |_| "alignment of",
+    phase: Some(Phase::Find),
     about: About::Later,
     needs: &[Need::reference(&LABEL), Need::same(&LABEL)],
     wanted: |until| until >= Until::Labelled,

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::graph::{About, Need, Phase, Run, Step};
 use crate::pipeline::steps::ingest::INGEST;
 use crate::pipeline::steps::segment::SEGMENT;
 use crate::pipeline::until::Until;
@@ -24,7 +24,7 @@ const FIELD: &str = "field.parquet";
 /// Compares the clouds of a later epoch with those of the reference, along normals.
 pub static M3C2: Step = Step {
     name: "m3c2",
-    words: |_| "M3C2 of",
+    phase: Some(Phase::Compare),
     about: About::Later,
     needs: &[
         Need::reference(&INGEST),

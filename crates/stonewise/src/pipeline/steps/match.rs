@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::files::write_readable_json;
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::graph::{About, Need, Phase, Run, Step};
 use crate::pipeline::outputs::outlines::OUTLINES;
 use crate::pipeline::steps::panels::PANELS;
 use crate::pipeline::until::Until;
@@ -17,7 +17,7 @@ use stonewise_core::stone::{MatchOutcome, UnmatchedReason};
 /// Finds the stones of the reference in a later epoch.
 pub static MATCH: Step = Step {
     name: "match",
-    words: |_| "matches of",
+    phase: Some(Phase::Match),
     about: About::Later,
     needs: &[Need::same(&OUTLINES), Need::same(&PANELS)],
     wanted: |until| until >= Until::Matched,

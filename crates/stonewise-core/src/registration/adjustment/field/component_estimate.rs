@@ -7,31 +7,9 @@ use super::problem::FieldProblem;
 use super::solve::assemble;
 use super::variance_components::{BOUNDS, COUNT, VarianceComponents};
 use crate::progress::{Interrupted, Progress};
-use rayon::prelude::*;
-
-/// Most steps. The search starts from the last estimate, and six steps of at most [`LARGEST_STEP`] cross the
-/// whole range of the bounds (six decades would be eight); the next call goes on.
-const STEPS: usize = 6;
-/// Distance of the values through which a parabola is laid in each logarithm: a factor of 1.5, over which
-/// deviances of 100 stones change by more than rounding and are still nearly quadratic.
-const WIDTH: f64 = 0.4;
-/// Largest change of a logarithm in one step: a factor of 4.5, beyond which a parabola of width [`WIDTH`]
-/// says nothing.
-const LARGEST_STEP: f64 = 1.5;
-/// Curvature below which the deviance counts as flat and a full step downhill is taken.
-const FLAT: f64 = 1e-3;
-/// Shares of the step that are tried: the components are correlated, so the full step may overshoot.
-const STEP_SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
-/// The search ends when a step gains less deviance than this: a hundredth of a standard error.
-const LEAST_GAIN: f64 = 0.02;
-/// Deviance of components for which the equations cannot be factored: worse than all others, and finite so
-/// that differences stay so.
-const UNSOLVABLE: f64 = f64::MAX / 1e6;
+use crate::registration::least_deviance::least_deviance;
 
 /// Variance components under which the stones' normal equations are most likely, field integrated out.
-///
-/// A Newton step in the logarithms from parabolas along each, then a search along it. Cost: at most 6 x 19
-/// factorisations.
 ///
 /// # Errors
 /// The caller stopped the work.
@@ -42,55 +20,10 @@ pub(crate) fn most_likely_components(
     let count = problem.components.count();
     let value = |log: &[f64; COUNT]| {
         let components = VarianceComponents::from_log(*log, count);
-        deviance(problem, &components).map_or(UNSOLVABLE, |d| d + components.penalty())
+        Some(deviance(problem, &components)? + components.penalty())
     };
-    let mut log = clamp(problem.components.to_log());
-
-    for _ in 0..STEPS {
-        progress.check()?;
-        let mut probes = vec![log];
-        for k in 0..count {
-            for sign in [-1.0, 1.0] {
-                let mut l = log;
-                l[k] += sign * WIDTH;
-                probes.push(clamp(l));
-            }
-        }
-        let values: Vec<f64> = probes.par_iter().map(value).collect();
-        let step = newton_step(&values, count);
-        let candidates = STEP_SHARES.map(|share| clamp(std::array::from_fn(|k| log[k] + share * step[k])));
-        let trial: Vec<f64> = candidates.par_iter().map(value).collect();
-        let best = (0..trial.len())
-            .min_by(|&a, &b| trial[a].total_cmp(&trial[b]))
-            .unwrap_or(0);
-        if trial[best] > values[0] - LEAST_GAIN {
-            break;
-        }
-        log = candidates[best];
-    }
-
+    let log = least_deviance(problem.components.to_log(), count, &BOUNDS, value, progress)?;
     Ok(VarianceComponents::from_log(log, count))
-}
-
-/// `values`: here, then below and above in each logarithm that counts.
-fn newton_step(values: &[f64], count: usize) -> [f64; COUNT] {
-    std::array::from_fn(|k| {
-        if k >= count {
-            return 0.0;
-        }
-        let (below, above) = (values[1 + 2 * k], values[2 + 2 * k]);
-        let curvature = below + above - 2.0 * values[0];
-        let slope = 0.5 * (below - above);
-        if curvature > FLAT {
-            (WIDTH * slope / curvature).clamp(-LARGEST_STEP, LARGEST_STEP)
-        } else {
-            LARGEST_STEP * slope.clamp(-1.0, 1.0)
-        }
-    })
-}
-
-fn clamp(log: [f64; COUNT]) -> [f64; COUNT] {
-    std::array::from_fn(|k| log[k].clamp(BOUNDS[k][0].ln(), BOUNDS[k][1].ln()))
 }
 
 /// Minus twice the log marginal likelihood of the normal equations, up to a constant, under other components

@@ -3,5 +3,5 @@
 mod likelihood_ratio;
 mod probing;
 
-pub(crate) use likelihood_ratio::{LikelihoodRatio, LikelihoodRatioTest, Placed};
+pub(crate) use likelihood_ratio::{LikelihoodRatioTest, Placed};
 pub(crate) use probing::Probe;

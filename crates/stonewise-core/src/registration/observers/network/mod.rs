@@ -16,6 +16,7 @@
 //! stones is left out; it belongs to the datum.
 
 mod bundle;
+mod matching;
 mod sight;
 mod size;
 
@@ -24,6 +25,7 @@ use crate::geometry::View;
 use crate::registration::modes::{less_rigid, main_modes};
 use crate::registration::random::Random;
 use bundle::{Bundle, BundleEquations};
+pub(crate) use matching::Matching;
 use nalgebra::{DMatrix, Matrix3xX};
 use rayon::prelude::*;
 use sight::{FIELDS, Sight};

@@ -276,3 +276,33 @@ fn tracked_stones_show_how_large_the_fields_are() {
     let square = mean_square(&network(true).photos, &[], &stones);
     assert!((square / (2.0 * 0.25f64).exp() - 1.0).abs() < 0.01, "{square}");
 }
+
+/// Two photos square on to the wall from 5 m with a base of 1 m: parallax times 12.5 mm a pixel is depth.
+#[test]
+fn matching_errs_in_depth_as_the_base_says() {
+    let photo = |y: f64| view([5.0, y, 1.0], [0.0, y, 1.0], 2000.0);
+    let photos = || vec![photo(-0.5), photo(0.5)];
+    let network = PhotoNetwork {
+        photos: [photos(), photos()],
+        is_joint: true,
+        shifts: Vec::new(),
+    };
+    let stone = |k: u32| SeenStone {
+        centroid: Point3::new(0.0, 0.01 * f64::from(k), 1.0),
+        normal: Vector3::x(),
+        sights: Vec::new(),
+    };
+    let found = network.matching(&(0..8).map(stone).collect::<Vec<_>>()).unwrap();
+    // Two photos give the parallax, and two epochs the difference.
+    let depth_m = 0.0125 * 0.06 * 2.0;
+    assert!(
+        (found.covariances[0][(0, 0)].sqrt() / depth_m - 1.0).abs() < 0.02,
+        "{found:?}"
+    );
+    assert!((found.length_m - 110.0 * 5.0 / 2000.0).abs() < 5e-3, "{found:?}");
+    let none = PhotoNetwork {
+        photos: [Vec::new(), Vec::new()],
+        ..network
+    };
+    assert_eq!(none.matching(&[]), None);
+}

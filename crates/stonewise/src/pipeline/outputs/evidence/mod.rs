@@ -7,7 +7,7 @@ mod tracks;
 mod window;
 
 use crate::error::{Error, Result};
-use crate::pipeline::graph::{Need, Run, Step};
+use crate::pipeline::graph::{Need, Phase, Run, Step};
 use crate::pipeline::steps::measure::MEASURE;
 use crate::pipeline::until::Until;
 use crate::report_params::logo_type;
@@ -22,7 +22,7 @@ use window::windows;
 /// Writes `evidence/`.
 pub static EVIDENCE: Step = Step {
     name: "evidence",
-    words: |_| "excerpts for the report",
+    phase: Some(Phase::Write),
     needs: &[Need::all(&MEASURE)],
     wanted: |until| until == Until::Reported,
     make: |run, _| {

@@ -14,7 +14,7 @@ use crate::edits::EditsFile;
 use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{Need, Run, Step};
+use crate::pipeline::graph::{Need, Phase, Run, Step};
 use crate::pipeline::until::Until;
 use crate::results::{Facade, facade_of, read_outlines};
 use crate::storage::labels::DiskLabels;
@@ -33,7 +33,7 @@ use stonewise_core::transfer::{
 /// Applies the project's edits to all epochs; an epoch that none changes stays as it is.
 pub static EDIT: Step = Step {
     name: "edit",
-    words: |_| "edits by hand",
+    phase: Some(Phase::Find),
     needs: &[Need::all(&CONFIRM)],
     wanted: |until| until >= Until::Labelled,
     applies: |project, _| project.edits.is_some(),

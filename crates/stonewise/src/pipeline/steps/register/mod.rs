@@ -18,11 +18,10 @@ mod windows;
 use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::graph::{About, Need, Phase, Run, Step};
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::r#match::MATCH;
 use crate::pipeline::until::Until;
-use crate::settings::Estimator;
 use crate::storage::step::Key;
 pub use datum::datum;
 use epoch_error::add_epoch_error;
@@ -41,10 +40,7 @@ use stonewise_core::stone::MotionFailure;
 /// Measures the motion of every matched stone.
 pub static REGISTER: Step = Step {
     name: STEP,
-    words: |settings| match settings.registration.estimator {
-        Estimator::Adjustment => "adjustment of",
-        Estimator::Gicp => "GICP of",
-    },
+    phase: Some(Phase::Measure),
     about: About::Later,
     needs: &[Need::same(&MATCH)],
     wanted: |until| until >= Until::Registered,

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::graph::{About, Need, Phase, Run, Step};
 use crate::pipeline::steps::ingest::{INGEST, Ingested};
 use crate::project::Project;
 use crate::storage::step::{Key, StepDir};
@@ -29,7 +29,7 @@ use stonewise_segment::{StoneFinder, Weights};
 /// Chooses among the photos of an epoch without masks, unless all of them are to be used.
 pub static CHOOSE: Step = Step {
     name: STEP,
-    words: |_| "photos chosen of",
+    phase: Some(Phase::Find),
     about: About::Epoch,
     needs: &[Need::same(&INGEST)],
     applies: Project::chooses_photos,

@@ -8,7 +8,7 @@ mod voting_photo;
 use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{About, Need, Photos, Run, Step};
+use crate::pipeline::graph::{About, Need, Phase, Photos, Run, Step};
 use crate::pipeline::steps::ingest::INGEST;
 use crate::pipeline::steps::views::VIEWS;
 use crate::project::{Epoch, Project};
@@ -32,7 +32,7 @@ use voting_photo::{PHOTOS, STEP, label_path, photo_bytes, posed_photos};
 /// them, else from the detector.
 pub static SEGMENT: Step = Step {
     name: STEP,
-    words: |_| "stones in the pictures of",
+    phase: Some(Phase::Find),
     about: About::Epoch,
     needs: &[
         Need::same(&VIEWS).when(Project::has_views),

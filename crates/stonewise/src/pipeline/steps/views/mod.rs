@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::cost::Cost;
-use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::graph::{About, Need, Phase, Run, Step};
 use crate::pipeline::steps::ingest::{INGEST, Ingested, scanners};
 use crate::project::{Epoch, PhotoFiles, Project};
 use crate::settings::Align;
@@ -32,7 +32,7 @@ use stonewise_segment::Weights;
 /// Makes views of the clouds of an epoch that has no photos, or beside them; later steps treat them as photos.
 pub static VIEWS: Step = Step {
     name: STEP,
-    words: |_| "views of the clouds of",
+    phase: Some(Phase::Find),
     about: About::Epoch,
     needs: &[Need::same(&INGEST), Need::reference(&VIEWS)],
     applies: Project::has_views,

@@ -1,7 +1,6 @@
 //! The points of a matched stone in the stone's frame.
 
 use super::local_motion::LocalMotion;
-use super::surface_noise::NoiseFactors;
 use crate::cloud::Cloud;
 use crate::registration::adjustment::stone_vector::StoneVector;
 use crate::registration::points::{PairPoints, Window};
@@ -17,8 +16,8 @@ pub(crate) struct LocalPair {
     labelled: usize,
     /// Where points count, and from the stone's frame to the window's.
     window: Option<(Arc<Window>, Matrix3<f64>)>,
-    /// Its noise over that of most stones.
-    pub noise: NoiseFactors,
+    /// Noise of each epoch's points over that of most stones.
+    pub noise: [f64; 2],
 }
 
 impl LocalPair {
@@ -30,12 +29,12 @@ impl LocalPair {
             labelled: second.len(),
             second,
             window: None,
-            noise: NoiseFactors::USUAL,
+            noise: [1.0; 2],
         }
     }
 
-    /// `noise`: that of the stone over that of most.
-    pub fn new(pair: &PairPoints, face_from_world: &Matrix3<f64>, noise: NoiseFactors) -> Self {
+    /// `noise`: that of each epoch's points over that of most stones.
+    pub fn new(pair: &PairPoints, face_from_world: &Matrix3<f64>, noise: [f64; 2]) -> Self {
         let local = |cloud: &Cloud| {
             let shift = cloud.origin() - pair.centroid;
             (0..cloud.len())
@@ -62,14 +61,12 @@ impl LocalPair {
         [self.first.len(), self.second.len()]
     }
 
-    /// The points that count where the window moved by `window`, and no others: of the second epoch those in
-    /// the window, of both those whose place in the first epoch `keep` takes.
-    pub fn counting(&self, window: &StoneVector, keep: impl Fn(&[f64; 3]) -> bool) -> Self {
+    /// The points that count where the window moved by `window`, and no others.
+    pub fn counting(&self, window: &StoneVector) -> Self {
         let window = LocalMotion::new(window);
-        let second = self.second_in(&window).into_iter().map(|(_, q)| q);
-        let second: Vec<[f64; 3]> = second.filter(|q| keep(&window.undo(q))).collect();
+        let second: Vec<[f64; 3]> = self.second_in(&window).into_iter().map(|(_, q)| q).collect();
         Self {
-            first: self.first.iter().filter(|p| keep(p)).copied().collect(),
+            first: self.first.clone(),
             labelled: second.len(),
             second,
             window: None,
@@ -128,7 +125,7 @@ mod tests {
             nearby_second: cloud(chosen.nearby_second),
             window: chosen.window.map(Arc::new),
         };
-        let local = LocalPair::new(&pair, &frame, NoiseFactors::USUAL);
+        let local = LocalPair::new(&pair, &frame, [1.0; 2]);
         let moved = LocalMotion::new(&StoneVector::from_translation(frame * shift));
         let counted: Vec<[f64; 3]> = local
             .second_in(&moved)

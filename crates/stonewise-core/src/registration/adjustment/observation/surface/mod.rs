@@ -16,7 +16,6 @@ mod patches;
 mod point_weights;
 mod robust;
 mod slope_scatter;
-mod stone_roughness;
 mod surface_noise;
 #[cfg(test)]
 mod testing;
@@ -30,7 +29,6 @@ pub(crate) use local_pair::LocalPair;
 pub(crate) use model::{Effort, Inflation, StoneSurface, SurfaceModel};
 pub(crate) use noise_estimate::estimate_noise;
 pub(crate) use point_weights::PointWeights;
-pub(crate) use stone_roughness::likely_roughness;
-pub(crate) use surface_noise::{NoiseFactors, SurfaceNoise};
+pub(crate) use surface_noise::SurfaceNoise;
 #[cfg(test)]
 pub(crate) use testing::without_points;

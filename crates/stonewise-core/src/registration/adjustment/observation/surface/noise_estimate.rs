@@ -4,7 +4,6 @@ use super::layout::Layout;
 use super::local_motion::LocalMotion;
 use super::local_pair::LocalPair;
 use super::patch_fit::PatchFit;
-use super::patch_grid::Observed;
 use super::patches::{PatchChoice, PatchPoints, pool_into_patches};
 use super::robust::robust_fit;
 use super::surface_noise::SurfaceNoise;
@@ -142,12 +141,7 @@ fn without_foreign(patches: Vec<PatchPoints>, noise: &SurfaceNoise, layout: &Lay
 /// Median distance of a patch's points of each epoch from the surface of both, metres; zero where they determine none.
 fn scatter(patch: &PatchPoints, noise: &SurfaceNoise, layout: &Layout) -> [f64; 2] {
     let mut epochs = patch.epochs.clone();
-    let Some(fit) = robust_fit(
-        patch.grid,
-        &mut epochs,
-        &noise.on_surface(patch.roughness),
-        layout,
-    ) else {
+    let Some(fit) = robust_fit(patch.grid, &mut epochs, noise, layout) else {
         return [0.0; 2];
     };
     epochs.map(|points| {
@@ -157,12 +151,12 @@ fn scatter(patch: &PatchPoints, noise: &SurfaceNoise, layout: &Layout) -> [f64; 
 }
 
 /// Copies of the patches, their points weighted by a robust fit of the surface; without patches that cannot be fitted.
-pub(super) fn reweighted(patches: &[PatchPoints], noise: &SurfaceNoise, layout: &Layout) -> Vec<PatchPoints> {
+fn reweighted(patches: &[PatchPoints], noise: &SurfaceNoise, layout: &Layout) -> Vec<PatchPoints> {
     patches
         .par_iter()
         .filter_map(|p| {
             let mut epochs = p.epochs.clone();
-            robust_fit(p.grid, &mut epochs, &noise.on_surface(p.roughness), layout)?;
+            robust_fit(p.grid, &mut epochs, noise, layout)?;
             Some(PatchPoints { epochs, ..*p })
         })
         .collect()
@@ -172,15 +166,12 @@ pub(super) fn reweighted(patches: &[PatchPoints], noise: &SurfaceNoise, layout: 
 fn deviance_of_weighted(patches: &[PatchPoints], noise: &SurfaceNoise) -> f64 {
     let terms: Vec<f64> = patches
         .par_iter()
-        .map(|p| deviance_of_observed(p, p.observed(noise), noise))
+        .map(|p| {
+            let fit = PatchFit::of(p.grid, p.observed(noise), noise);
+            fit.map_or(UNSOLVABLE, |fit| fit.deviance(p.points(), noise))
+        })
         .collect();
     terms.iter().sum()
-}
-
-/// Minus twice the log marginal likelihood of a patch's points, up to a constant; `observed`: their normal equations.
-pub(super) fn deviance_of_observed(patch: &PatchPoints, observed: Observed, noise: &SurfaceNoise) -> f64 {
-    let noise = &noise.on_surface(patch.roughness);
-    PatchFit::of(patch.grid, observed, noise).map_or(UNSOLVABLE, |fit| fit.deviance(patch.points(), noise))
 }
 
 #[cfg(test)]

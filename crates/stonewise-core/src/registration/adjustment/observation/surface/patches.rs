@@ -6,7 +6,6 @@ use super::local_motion::{LocalMotion, Still};
 use super::local_pair::LocalPair;
 use super::patch_grid::{Observed, PatchGrid, WeightedPoint};
 use super::surface_noise::SurfaceNoise;
-use std::collections::BTreeSet;
 
 /// Points in each epoch that a patch needs: twice the unknowns of a plane, for a fit whose outliers can be detected.
 const PATCH_POINTS: usize = 12;
@@ -17,9 +16,6 @@ const MARGIN_CELLS: f64 = 2.0;
 /// epoch. The fit depends on where points lie between the cells, most for sharp points: if these moved over the cells,
 /// some motions would seem likelier by that alone.
 const HEAVIER: f64 = 2.0;
-/// Step from one used patch to the next, as a fraction of the number of patches (modulo one): the inverse golden ratio,
-/// so that they lie neither in one row nor in one column.
-const NEXT_PATCH: f64 = 0.618_033_988_75;
 /// Shortest side of a patch, in cells: a cubic spline's four coefficients.
 const LEAST_CELLS: usize = 4;
 
@@ -27,8 +23,6 @@ const LEAST_CELLS: usize = 4;
 pub(crate) struct PatchPoints {
     pub grid: PatchGrid,
     pub epochs: [Vec<WeightedPoint>; 2],
-    /// Roughness of the stone over that of most.
-    pub roughness: f64,
 }
 
 impl PatchPoints {
@@ -50,8 +44,6 @@ pub(crate) enum PatchChoice {
     All,
     /// If there are more than two patches, those on one colour of a chessboard: the colour with more patches.
     EverySecond,
-    /// At most this many, spread over the face.
-    AtMost(usize),
 }
 
 pub(crate) struct Patches {
@@ -114,11 +106,7 @@ pub(crate) fn pool_into_patches(
             let of_place = |place: &usize| grid.point(points[*place].0, points[*place].1);
             places[patch][epoch].iter().map(of_place).collect()
         });
-        PatchPoints {
-            grid,
-            epochs,
-            roughness: pair.noise.roughness,
-        }
+        PatchPoints { grid, epochs }
     };
     Patches {
         list: chosen.into_iter().map(of_patch).collect(),
@@ -174,11 +162,6 @@ impl Cuts {
                 let are_dark = 2 * patches.iter().filter(|patch| is_dark(patch)).count() > count;
                 patches.retain(|patch| is_dark(patch) == are_dark);
                 patches
-            }
-            PatchChoice::AtMost(most) if count > most => {
-                let place = |k: usize| (((k as f64 + 0.5) * NEXT_PATCH).fract() * count as f64) as usize;
-                let places: BTreeSet<usize> = (0..most).map(place).collect();
-                places.into_iter().map(|place| patches[place]).collect()
             }
             _ => patches,
         }
@@ -244,12 +227,8 @@ mod tests {
             assert_eq!(found, (0..8000).collect::<Vec<u32>>());
         }
         let half = chosen(PatchChoice::EverySecond);
-        let four = chosen(PatchChoice::AtMost(4));
-        assert_eq!(
-            (half.len(), four.len(), chosen(PatchChoice::AtMost(99)).len()),
-            (15, 4, 30)
-        );
-        for patch in half.iter().chain(&four) {
+        assert_eq!(half.len(), 15);
+        for patch in &half {
             let same = all.iter().find(|other| corner(other) == corner(patch)).unwrap();
             assert_eq!(indices(same, 1), indices(patch, 1));
         }
