@@ -135,6 +135,7 @@ fn designed(dir: &Path, plan: &str) -> (Value, PathBuf) {
 }
 
 #[test]
+#[ignore = "a minute: .ci/nightly runs it"]
 fn the_candidate_that_sees_the_rest_of_a_planned_wall_comes_first() {
     let dir = tempfile::tempdir().unwrap();
     let (design, out) = designed(dir.path(), PLAN);
@@ -193,6 +194,7 @@ candidate = true
 "#;
 
 #[test]
+#[ignore = "a minute: .ci/nightly runs it"]
 fn drone_photos_and_targets_are_planned_like_stations() {
     let dir = tempfile::tempdir().unwrap();
     let (design, out) = designed(dir.path(), FLOWN);

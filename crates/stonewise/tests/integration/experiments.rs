@@ -53,6 +53,7 @@ fn column(path: &Path, name: &str) -> Vec<String> {
 }
 
 #[test]
+#[ignore = "a minute: .ci/nightly runs it"]
 fn a_grid_finds_what_single_runs_find_and_resumes() {
     let (dir, mut project) = survey();
     project.epochs[EpochId::at(1)].motion =
@@ -130,6 +131,7 @@ fn a_grid_says_what_cannot_be() {
 }
 
 #[test]
+#[ignore = "a minute: .ci/nightly runs it"]
 fn the_papers_experiment_splits_one_epoch_and_scores_every_method() {
     let (dir, project) = survey();
     let out = dir.path().join("paper");

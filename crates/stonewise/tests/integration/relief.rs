@@ -126,6 +126,7 @@ fn alone(project: &Path, model: &Path, out: &Path) -> LabelImage {
 }
 
 #[test]
+#[ignore = "a minute: .ci/nightly runs it"]
 fn a_run_looks_at_clouds_where_its_detector_has_learnt_relief() {
     let folder = tempfile::tempdir().unwrap();
     let out = |name: &str| folder.path().join(name);

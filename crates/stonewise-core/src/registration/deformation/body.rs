@@ -136,11 +136,7 @@ impl<'a> Body<'a> {
             let error = error_of(joint.id);
             let taken_off = error.map_or_else(Vector3::zeros, |(e, k)| e.mean_of_motions[k]);
             let off_points = error.map_or_else(Vector3::zeros, |(e, k)| e.mean[k]);
-            // In the face a stone follows its neighbours, and what the field does not share already counts there as an
-            // error of its observations.
-            let out = joint.face_from_world.row(2).transpose();
-            let across = error.map_or(0.0, |(e, k)| out.dot(&(e.own[k] * out)));
-            let of_sources = out * out.transpose() * across;
+            let of_sources = error.map_or_else(Matrix3::zeros, |(e, k)| e.own[k]);
             let mut lever = lever(&(joint.place - middle));
             lever.fixed_columns_mut::<3>(3).unscale_mut(arm_m);
             let (information, vector) = joint.observed;

@@ -11,7 +11,7 @@ use super::epoch_pair::{EpochErrorParams, EpochPair, all_sights};
 use super::joint::JointErrors;
 use super::lone_area::LoneArea;
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
-use super::observation::{Observation, in_face};
+use super::observation::Observation;
 use super::relative::relative_errors;
 use super::rigid::{RigidError, difference_row, neighbour_row, rigid_rows, shares};
 use super::scale::ScaleError;
@@ -230,13 +230,13 @@ fn of_sources(
     };
 
     let merged_error_m = relative.as_ref().and_then(|r| r.merged_error_m);
-    let mut at = found.at_stones(pair, &unknowns, model.components.nugget_m);
+    let mut at = found.at_stones(pair, &unknowns, model.components.nugget_m[1]);
     let motions = means_of_motions(pair, &at, &rigid);
     at.iter_mut().zip(&motions).for_each(|(at, mean)| at.mean = *mean);
     let (relative, between, joint) = match relative {
         Some(relative) => (relative.at, relative.between, relative.joint),
         None => {
-            let joint = found.joint(pair, &unknowns, model.components.nugget_m);
+            let joint = found.joint(pair, &unknowns, model.components.nugget_m[1]);
             let joint = joint.map(|joint| JointErrors {
                 mean_of_motions: motions,
                 ..joint
@@ -427,18 +427,18 @@ impl Averaged {
         }
     }
 
-    /// `nugget_m`: independent error of each source at each stone, in the face and across it.
-    fn at_stones(&self, pair: &EpochPair, unknowns: &Unknowns, nugget_m: [f64; 2]) -> Vec<ErrorAt> {
+    /// `across_m`: independent error of each source at each stone, out of its face.
+    fn at_stones(&self, pair: &EpochPair, unknowns: &Unknowns, across_m: f64) -> Vec<ErrorAt> {
         let at = |stone: &SeenStone| {
             let mut error = self.function(&difference_row(stone, pair.sources, unknowns));
-            error.covariance += of_stone_alone(stone, pair, nugget_m);
+            error.covariance += of_stone_alone(stone, pair, across_m);
             error
         };
         pair.stones.par_iter().map(at).collect()
     }
 
     /// The error at all stones together.
-    fn joint(&self, pair: &EpochPair, unknowns: &Unknowns, nugget_m: [f64; 2]) -> Option<JointErrors> {
+    fn joint(&self, pair: &EpochPair, unknowns: &Unknowns, across_m: f64) -> Option<JointErrors> {
         let stones = pair.stones.iter();
         let rows = stones.clone().map(|s| difference_row(s, pair.sources, unknowns));
         let weighted: Vec<_> = self
@@ -446,7 +446,7 @@ impl Averaged {
             .iter()
             .map(|(w, s)| (*w, &s.mean, &s.covariance))
             .collect();
-        let own = stones.map(|s| of_stone_alone(s, pair, nugget_m)).collect();
+        let own = stones.map(|s| of_stone_alone(s, pair, across_m)).collect();
         JointErrors::new(rows.collect(), &weighted, own, true)
     }
 
@@ -498,11 +498,11 @@ impl Averaged {
     }
 }
 
-/// Covariance of the independent errors of the sources at a stone, which are `nugget_m` in the face and across
-/// it.
-fn of_stone_alone(stone: &SeenStone, pair: &EpochPair, nugget_m: [f64; 2]) -> Matrix3<f64> {
+/// Covariance of the independent errors of the sources at a stone, `across_m` out of its face. In the face a stone
+/// follows its neighbours, and what the field does not share counts there as an error of its observations already.
+fn of_stone_alone(stone: &SeenStone, pair: &EpochPair, across_m: f64) -> Matrix3<f64> {
     let squares: f64 = shares(stone, pair.sources).iter().map(|s| s * s).sum();
-    in_face(&stone.normal, nugget_m) * squares
+    stone.normal * stone.normal.transpose() * (across_m.powi(2) * squares)
 }
 
 /// Factor on the mean variance of a mixture of centred normal laws, (share, variance) each, by which 1.96

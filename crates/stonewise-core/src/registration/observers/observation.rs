@@ -1,7 +1,6 @@
 //! Differences between what several sources show of one unmoved place.
 
 use super::sight::{Sight, StablePlane};
-use crate::geometry::FaceFrame;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 /// What a small part of the wall, or of a stable area, says about the errors of the sources that see it.
@@ -80,13 +79,4 @@ impl Observation {
         }
         sum / self.weight
     }
-}
-
-/// Covariance in the world of independent errors with these standard deviations in the face and across it,
-/// metres.
-pub(super) fn in_face(normal: &Vector3<f64>, sd_m: [f64; 2]) -> Matrix3<f64> {
-    let face_from_world = FaceFrame::from_normal(normal).face_from_world();
-    let [inside, across] = sd_m.map(|s| s * s);
-    let variances = Matrix3::from_diagonal(&Vector3::new(inside, inside, across));
-    face_from_world.transpose() * variances * face_from_world
 }

@@ -5,9 +5,7 @@
 //! pixels of 4 mm, what the photos' fields do not explain has a standard deviation of 0.6 mm and changes over 0.43 m
 //! (restricted maximum likelihood, Matern covariance); one pixel of all photos is about 10 mm of depth there.
 
-use super::PhotoNetwork;
 use super::sight::{Sight, intersection};
-use crate::registration::observers::sight::SeenStone;
 use crate::statistics::upper_median;
 use nalgebra::Matrix3;
 
@@ -36,13 +34,10 @@ impl Matching {
             covariances: vec![Matrix3::identity() * USUAL_M[0].powi(2); stones],
         }
     }
-}
 
-impl PhotoNetwork {
-    /// The errors of matching of the stones; `None` where no photos see one.
-    pub(crate) fn matching(&self, stones: &[SeenStone]) -> Option<Matching> {
-        let seen = self.sights(stones);
-        let first_later = self.photos[0].len();
+    /// Of the stones that these photos see, those of the later epoch from number `first_later` on; `None` where no photo
+    /// sees one.
+    pub(super) fn seen(sights: &[Vec<Sight>], first_later: usize) -> Option<Self> {
         let of_stone = |sights: &Vec<Sight>| {
             let of_epoch = |is_later: bool| -> Vec<&Sight> {
                 sights
@@ -53,11 +48,11 @@ impl PhotoNetwork {
             let inverses = [false, true].map(|epoch| intersection(&of_epoch(epoch)));
             inverses.into_iter().flatten().sum::<Matrix3<f64>>() * MATCHING_PX.powi(2)
         };
-        let pixels = seen.iter().flatten().map(|s| s.by_place.row(0).norm().recip());
+        let pixels = sights.iter().flatten().map(|s| s.by_place.row(0).norm().recip());
         let pixel_m = upper_median(&mut pixels.collect::<Vec<f64>>())?;
-        Some(Matching {
+        Some(Self {
             length_m: ALIKE_PX * pixel_m,
-            covariances: seen.iter().map(of_stone).collect(),
+            covariances: sights.iter().map(of_stone).collect(),
         })
     }
 }

@@ -92,6 +92,11 @@ impl PhotoNetwork {
         Some(main_modes(&apart).into_iter().map(|by| by * size).collect())
     }
 
+    /// Errors of matching that neighbouring stones share; `None` where no photo sees a stone.
+    pub(crate) fn matching(&self, stones: &[SeenStone]) -> Option<Matching> {
+        Matching::seen(&self.sights(stones), self.photos[0].len())
+    }
+
     /// The photos that see each stone; those that see too few stones are left out.
     fn sights(&self, stones: &[SeenStone]) -> Vec<Vec<Sight>> {
         let views: Vec<&View> = self.photos.iter().flatten().collect();
