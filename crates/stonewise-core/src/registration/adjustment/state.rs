@@ -38,7 +38,7 @@ pub(crate) struct StoneState {
     pub p_with_field: f64,
     /// Whether its observations tell a loose stone from one that moves with the field.
     pub decides: bool,
-    /// Whether its last step exceeded a tenth of the uncertainty of its motion.
+    /// Whether its last step exceeded a tenth of the uncertainty of its motion; not where the adjustment has settled.
     pub moves: bool,
     /// Effective degrees of freedom: how many unknowns the stone's own points determine.
     pub effective_freedom: f64,

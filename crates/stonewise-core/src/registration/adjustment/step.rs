@@ -15,8 +15,8 @@ const RESTLESS: usize = 50;
 const SUSPECT: f64 = 1.5;
 /// A step within this share of its standard deviation no longer matters.
 const SETTLED: f64 = 0.01;
-/// A stone whose last step stayed within this share of its standard deviation has a motion: what is missing does not
-/// change its interval.
+/// Where no iteration is left, a stone whose last step stayed within this share of its standard deviation has
+/// a motion: what is missing does not change its interval.
 const NEARLY_SETTLED: f64 = 0.1;
 /// Where no iteration is left, the wall has converged if at most one stone in this many has not: those have no motion.
 const UNSETTLED: usize = 10;
@@ -43,7 +43,11 @@ impl Adjustment {
             restless += usize::from(with_field.counts) + usize::from(on_own.counts);
             self.stones[i].moves = with_field.moves || on_own.moves;
         }
-        restless * RESTLESS <= self.stones.len()
+        let is_at_rest = restless * RESTLESS <= self.stones.len();
+        if is_at_rest {
+            self.stones.iter_mut().for_each(|stone| stone.moves = false);
+        }
+        is_at_rest
     }
 
     /// Returns true if most stones no longer move. The others have no motion.
