@@ -33,8 +33,9 @@ mod lab {
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// Names of all mechanisms that can be switched off.
-    pub const SWITCHES: [&str; 20] = [
+    pub const SWITCHES: [&str; 22] = [
         "across",
+        "bodies",
         "correlation",
         "covered",
         "crack",
@@ -45,6 +46,7 @@ mod lab {
         "obs_stretch",
         "obs_widened",
         "octaves_shown",
+        "partial",
         "probe",
         "sensors",
         "shared",

@@ -425,7 +425,7 @@ static ENGLISH: Texts = Texts {
         "no stone of the wall: fields of one relief that stand back from it, as of a door or a shutter",
         "too few points for an estimate",
         "the estimate did not settle",
-        "the two epochs do not show the same surface",
+        "the two epochs do not show the same surface, or nothing confirms a motion unlike the rest of the wall",
         "the surface is too flat to show the motion",
     ],
     terms: [
@@ -681,7 +681,7 @@ static GERMAN: Texts = Texts {
         "kein Stein der Mauer: Felder mit gleichem Relief, die hinter ihr liegen, wie die einer T\u{fc}r oder eines Ladens",
         "zu wenige Punkte f\u{fc}r eine Sch\u{e4}tzung",
         "die Sch\u{e4}tzung ist nicht zur Ruhe gekommen",
-        "die beiden Epochen zeigen nicht dieselbe Oberfl\u{e4}che",
+        "die beiden Epochen zeigen nicht dieselbe Oberfl\u{e4}che, oder nichts best\u{e4}tigt eine Bewegung, die der \u{fc}brigen Mauer widerspricht",
         "die Oberfl\u{e4}che ist zu eben, um die Bewegung zu zeigen",
     ],
     terms: [

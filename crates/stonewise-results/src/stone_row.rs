@@ -201,7 +201,9 @@ impl Status {
             }
             Self::FailedPoints => "too few points for an estimate",
             Self::FailedConvergence => "the estimate did not settle",
-            Self::FailedDisagreement => "the two epochs do not show the same surface",
+            Self::FailedDisagreement => {
+                "the two epochs do not show the same surface, or nothing confirms a motion unlike the rest of the wall"
+            }
             Self::Unobservable => "the surface is too flat to show the motion",
         }
     }

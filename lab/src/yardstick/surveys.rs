@@ -127,9 +127,10 @@ fn happened(name: &str) -> Vec<WallMotion> {
 /// What else happens: its name, what measures it, the motion of the stones, and what is changed in the plan.
 type Kind = (&'static str, &'static [&'static str], &'static str, fn(&mut Plan));
 
-/// Mechanisms by what happens: `probe` far; `covered`, `foreign` ivy; `two_surfaces` partners, masks; `sensors`
-/// other_sensor; `correlation`, `stone_factor`, `slopes` lines; `crack`, `across` crack; `zone` creep; `octaves_shown`,
-/// `shared` photos; `obs_*` every survey with sources, above all stable, merged and the faults of sources at the end.
+/// Mechanisms by what happens: `probe` far; `covered`, `foreign` ivy; `partial` car, snow, half; `two_surfaces`
+/// partners, masks; `bodies` buttress, door; `sensors` other_sensor; `correlation`, `stone_factor`, `slopes` lines;
+/// `crack`, `across` crack; `zone` creep; `octaves_shown`, `shared` photos; `obs_*` every survey with sources, above all
+/// stable, merged and the faults of sources at the end.
 const KINDS: [Kind; 32] = [
     ("masks", &["tls", "uav", "photos"], "combo", |p| {
         p.events.push(Event::Masks)

@@ -76,11 +76,12 @@ messages! {
 
         PART_REFUSED = "part-in-disagreement":
             "{stones} neighbouring stones of a part of the wall, around stone {stone}, have no motion: the clouds of the two epochs show \
-            different surfaces there. Something covers the part (plants, snow, a banner), it moved, or its masks mislead. Its motion is \
-            unknown",
+            different surfaces there, or a motion unlike that of the rest which nothing confirms. Something covers the part (plants, snow, a \
+            banner), it moved, or its clouds or masks mislead. Its motion is unknown",
             "{stones} benachbarte Steine eines Teils der Mauer um Stein {stone} haben keine Bewegung: die Punktwolken der beiden Epochen zeigen \
-            dort verschiedene Oberflächen. Etwas bedeckt den Teil (Pflanzen, Schnee, ein Banner), er hat sich bewegt, oder seine Masken \
-            täuschen. Seine Bewegung ist unbekannt";
+            dort verschiedene Oberflächen, oder eine Bewegung anders als die der übrigen Mauer, die nichts bestätigt. Etwas bedeckt den Teil \
+            (Pflanzen, Schnee, ein Banner), er hat sich bewegt, oder seine Punktwolken oder Masken täuschen. Seine Bewegung ist \
+            unbekannt";
 
         BLIND = "insensitive":
             "motions below about {limit} mm cannot be detected in the weakest direction, {excess} times what the spacing and the noise \

@@ -1,5 +1,6 @@
 //! A stone's motion, and how it departs from its neighbours', with looseness averaged out.
 
+use super::candidate::Moving;
 use super::field::{Prediction, covariance_against, posterior};
 use super::observation::NormalEquations;
 use super::solution::Solution;
@@ -46,8 +47,8 @@ impl Adjustment {
     /// A stone's motion about the common motion.
     ///
     /// Where the stone is not followed on its own, it moves with its neighbours. Otherwise mean and covariance are those
-    /// of the mixture of two cases: it moves with the field, or it is loose. Beside a crack, the field is a mixture of
-    /// that of either side.
+    /// of the mixture of three cases: it moves with the field, it is loose, or its clouds show it at a wrong place, and
+    /// only photos and neighbours say where it is. Beside a crack, the field is a mixture of that of either side.
     ///
     /// `shared`: variances of errors that a stone's points share, against its neighbours; they are in the
     /// relative covariance. `across_m`: by how much the stones beyond a crack beside it moved more, in its frame.
@@ -98,14 +99,19 @@ impl Adjustment {
         let Some(at_own) = equations.on_own.as_ref().filter(|_| stone.on_own.is_some()) else {
             return Estimate::of(&tied, 1.0);
         };
-        let p_tied = 1.0 - self.p_loose(stone);
+        let (p_loose, p_wrong) = (self.p_loose(stone), stone.p_wrong());
+        let p_tied = 1.0 - p_loose - p_wrong;
+        let photos = self.observed_by_photos(i, Moving::WithField);
+
+        let without_clouds = photos.unwrap_or_else(NormalEquations::nothing);
         let scaled = |case: Case| Case {
             probability: p_tied * case.probability,
             ..case
         };
         let mut cases: Vec<Case> = tied.into_iter().map(scaled).collect();
         let loose = case(prediction, at_own, &self.prior.loose_variances(), 0.0);
-        cases.push(loose.of_probability(1.0 - p_tied));
+        let wrong = case(prediction, &without_clouds, &own, slide_m2);
+        cases.extend([loose.of_probability(p_loose), wrong.of_probability(p_wrong)]);
         Estimate::of(&cases, p_tied)
     }
 
@@ -133,7 +139,7 @@ impl Adjustment {
     /// stone.
     pub fn p_loose(&self, stone: &StoneState) -> f64 {
         match stone.decides {
-            true => 1.0 - stone.p_with_field,
+            true => (1.0 - stone.p_with_field) * (1.0 - stone.doubt),
             false => self.prior.loose.share,
         }
     }

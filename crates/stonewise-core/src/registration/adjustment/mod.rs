@@ -25,6 +25,7 @@ pub(crate) mod observation;
 mod octaves;
 mod outcome;
 mod params;
+mod partial_view;
 mod phases;
 mod significance;
 mod solution;

@@ -1,6 +1,6 @@
 //! From the adjusted stones to one row per pair, with tests and uncertainties.
 
-use super::bodies::bodies;
+use super::bodies::{bodies, refuse_unconfirmed};
 use super::breaks::find_breaks;
 use super::candidate::Moving;
 use super::covered::{covered, leave_out_covered};
@@ -88,6 +88,7 @@ impl Found {
         let poses = octaves.of_poses(adjustment);
         let mut results = results(adjustment, solution, &tested, &estimates, (&octaves, &poses));
         leave_out_covered(&covered, &mut results);
+        refuse_unconfirmed(adjustment, &mut results);
         Self {
             breaks: find_breaks(adjustment, &solution.field.state, |i| tested[i].is_loose),
             neighbours: neighbour_covariances(adjustment, solution, &results, &estimates, (&octaves, &poses)),

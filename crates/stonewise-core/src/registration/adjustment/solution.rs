@@ -7,7 +7,8 @@ use super::field::{
     probabilities_with_field, reweight_ties, solve,
 };
 use super::observation::NormalEquations;
-use super::state::Adjustment;
+use super::partial_view::estimated_rate;
+use super::state::{Adjustment, StoneState};
 use crate::progress::{Interrupted, Progress};
 use crate::switches::switchable;
 use nalgebra::{Matrix3, Vector3};
@@ -241,14 +242,35 @@ impl Adjustment {
     fn reweight_stones(&mut self, equations: &[StoneEquations], field: &Field) {
         let problem = self.problem(equations.iter().map(|e| &e.with_field));
         let on_own: Vec<Option<&NormalEquations>> = equations.iter().map(|e| e.on_own.as_ref()).collect();
+        let stones = 0..self.stones.len();
+        let shares: Vec<f64> = stones.map(|i| self.leaving_share(i)).collect();
         let shared = self.shared_variances(1.0);
-        let probabilities = probabilities_with_field(&problem, &on_own, field, &shared);
+        let probabilities = probabilities_with_field(&problem, &on_own, field, &shared, &shares);
         for (stone, p) in self.stones.iter_mut().zip(probabilities) {
             stone.p_with_field = p;
         }
         self.return_to_field(equations, field);
-        let decided = self.stones.iter().filter(|s| s.decides);
-        self.prior.loose.share = estimated_share(self.params.loose_share, decided.map(|s| self.p_loose(s)));
+        let predictions = field.from_others.par_iter().enumerate();
+        let doubts: Vec<f64> = predictions
+            .map(|(i, prediction)| self.doubt(i, prediction))
+            .collect();
+        for (stone, doubt) in self.stones.iter_mut().zip(doubts) {
+            stone.doubt = doubt;
+        }
+        let decided = || self.stones.iter().filter(|s| s.decides);
+        let wrong = |s: &StoneState| (s.info.hidden, s.p_wrong());
+        self.wrong_rate = estimated_rate(decided().map(wrong));
+        self.prior.loose.share = estimated_share(self.params.loose_share, decided().map(|s| self.p_loose(s)));
+    }
+
+    /// Probability that the clouds are wrong about a stone, if they show it away from its neighbours; none where
+    /// its photos show that it left them, too.
+    fn doubt(&self, i: usize, prediction: &Prediction) -> f64 {
+        let wrong = self.wrong_share(i);
+        if wrong == 0.0 || self.photos_show_own_motion(i, prediction) {
+            return 0.0;
+        }
+        wrong / (wrong + self.prior.loose.share)
     }
 
     /// Returns stones to the field whose points barely constrain their motion: few noisy points have optima far away.
@@ -331,6 +353,59 @@ mod tests {
         let (still, moved) = (Vector3::zeros(), Vector3::new(0.0, 0.008, 0.004));
         assert!(is_parted(moved, moved));
         assert!(!is_parted(still, moved));
+    }
+
+    #[test]
+    fn probabilities_are_finite_where_the_clouds_are_surely_wrong() {
+        let source = MemoryPairs::new(wall(5, [0.001; 2], |_| Vector3::zeros()));
+        let (mut adjustment, points) = begun(&source);
+        adjustment.estimate_noise(&points.sample);
+        adjustment.wrong_rate = 1.0;
+        for (stone, hidden) in [(20, 0.99), (21, 1.0)] {
+            adjustment.stones[stone].info.hidden = hidden;
+            assert_eq!(adjustment.leaving_share(stone), 0.5);
+        }
+        let solution = solved(&mut adjustment, &points);
+        assert!(adjustment.is_finite(&solution.field));
+        // Their points show that they move with the field.
+        assert!((20..=21).all(|i| adjustment.stones[i].p_with_field > 0.5));
+        adjustment.stones[20].p_with_field = f64::NAN;
+        assert!(!adjustment.is_finite(&solution.field));
+    }
+
+    #[test]
+    fn a_stone_of_which_one_epoch_shows_little_is_not_called_loose_by_its_clouds_alone() {
+        let moved = Vector3::new(0.0, 0.015, 0.0);
+        let motion = |k| moved * f64::from(u8::from(k == 20));
+        let source = MemoryPairs::new(wall(5, [0.001; 2], motion));
+        let [seen, hidden] = [0.0, 0.7].map(|hidden| {
+            let (mut adjustment, points) = begun(&source);
+            adjustment.stones[20].info.hidden = hidden;
+            adjustment.estimate_noise(&points.sample);
+            let mut last = None;
+            for _ in 0..8 {
+                let solution = solved(&mut adjustment, &points);
+                adjustment.step(&solution);
+                last = Some(solution);
+            }
+            let estimate = adjustment.estimate(20, &last.unwrap(), &adjustment.shared_variances(1.0), None);
+            let along = estimate.mean + adjustment.prior.common_in(20);
+            let sd = estimate.covariance[(0, 0)].sqrt();
+            let p_loose = adjustment.p_loose(&adjustment.stones[20]);
+            (along.translation().x.abs(), sd, p_loose)
+        });
+        let (along, sd, p_loose) = seen;
+        assert!(
+            (along - 0.015).abs() < 5e-4 && sd < 1e-3 && p_loose > 0.95,
+            "{seen:?}"
+        );
+        // A loose stone and clouds at a wrong place are about as probable: the interval holds either.
+        let (along, sd, p_loose) = hidden;
+        assert!((0.2..0.9).contains(&p_loose), "{hidden:?}");
+        assert!(
+            (along - 0.015).abs() < 1.96 * sd && along < 1.96 * sd,
+            "{hidden:?}"
+        );
     }
 
     #[test]

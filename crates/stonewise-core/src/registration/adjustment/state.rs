@@ -5,11 +5,15 @@ use super::field::{LoosePrior, MotionPrior, Place};
 use super::observation::photo::PhotoModel;
 use super::observation::surface::{Layout, StoneSurface, SurfaceModel};
 use super::params::AdjustmentParams;
+use super::partial_view::expected_rate;
 use super::stone_vector::StoneVector;
 use super::survey::{StoneInfo, smoothed_shifts};
 use crate::geometry::SmallMotion;
 use crate::statistics::component_median;
 use nalgebra::Vector3;
+
+/// Largest prior probability that a stone appears not to move with the field: its observations decide.
+const MOST_LEAVING: f64 = 0.5;
 
 /// All stones, what is assumed of their motions, and the models under which they are observed.
 pub(crate) struct Adjustment {
@@ -19,6 +23,8 @@ pub(crate) struct Adjustment {
     pub surface: SurfaceModel,
     /// What photos show of the stones, where they are used.
     pub photos: Option<PhotoModel>,
+    /// How often the clouds show stones at a wrong place, see [`Self::wrong_share`].
+    pub wrong_rate: f64,
     pub params: AdjustmentParams,
 }
 
@@ -36,6 +42,8 @@ pub(crate) struct StoneState {
     pub log_ratio: f64,
     /// Probability that the stone moves with the field.
     pub p_with_field: f64,
+    /// Probability that the clouds show it at a wrong place, if they show it away from its neighbours.
+    pub doubt: f64,
     /// Whether its observations tell a loose stone from one that moves with the field.
     pub decides: bool,
     /// Whether its last step exceeded a tenth of the uncertainty of its motion; not where the adjustment has settled.
@@ -70,6 +78,7 @@ impl Adjustment {
             prior,
             surface: SurfaceModel::start(layout),
             photos: None,
+            wrong_rate: expected_rate(),
             params: params.clone(),
         })
     }
@@ -92,9 +101,26 @@ impl Adjustment {
             self.prior.common = common;
         }
     }
+
+    /// Probability beforehand that the clouds show a stone at a wrong place: it grows with the square of what one
+    /// epoch does not show of the face.
+    pub fn wrong_share(&self, i: usize) -> f64 {
+        self.wrong_rate * self.stones[i].info.hidden.powi(2)
+    }
+
+    /// Prior probability that a stone appears not to move with the field: it is loose, or its clouds show it at a
+    /// wrong place. At most one half.
+    pub fn leaving_share(&self, i: usize) -> f64 {
+        (self.prior.loose.share + self.wrong_share(i)).min(MOST_LEAVING)
+    }
 }
 
 impl StoneState {
+    /// Probability that the clouds show it at a wrong place.
+    pub fn p_wrong(&self) -> f64 {
+        (1.0 - self.p_with_field) * self.doubt
+    }
+
     fn new(info: StoneInfo, translation: Vector3<f64>) -> Self {
         Self {
             info,
@@ -103,6 +129,7 @@ impl StoneState {
             on_own: None,
             log_ratio: 0.0,
             p_with_field: 1.0,
+            doubt: 0.0,
             decides: true,
             moves: false,
             effective_freedom: 0.0,

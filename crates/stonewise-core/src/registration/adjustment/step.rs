@@ -73,7 +73,7 @@ impl Adjustment {
         let prediction = &field.from_others[i];
         let origin = self.prior.common_in(i);
         let limits = StepLimits::of(self);
-        let expected = self.prior.loose.share;
+        let expected = self.leaving_share(i);
         let stone = &mut self.stones[i];
         let p_loose = 1.0 - stone.p_with_field;
         if let (Some(own), Some(equations)) = (&mut stone.on_own, &equations.on_own) {

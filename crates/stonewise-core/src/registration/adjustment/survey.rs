@@ -3,11 +3,12 @@
 use super::error::AdjustError;
 use super::field::{Graph, Place};
 use super::params::AdjustmentParams;
+use super::partial_view::{hidden, missing};
 use crate::id::StoneId;
 use crate::progress::{Interrupted, Progress, ahead};
 use crate::registration::points::{NOISES_ALIKE, PairPoints, PairSource, Window, face_spacing};
 use crate::statistics::{component_median, upper_median};
-use crate::switches::switchable;
+use crate::switches::{switchable, where_on};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,6 +26,8 @@ pub(crate) struct StoneInfo {
     pub usable: bool,
     /// Noise of each epoch's points over that of most stones: 1 unless another sensor measured the stone.
     pub noise_factors: [f64; 2],
+    /// How much less of its face one epoch shows than is usual, or than points show well, as a share.
+    pub hidden: f64,
     /// Sources of each epoch's points, with the share of each; none where the points were not chosen by a window.
     pub sources: [Vec<(u32, f64)>; 2],
 }
@@ -137,6 +140,13 @@ pub(crate) fn survey<'a, S: PairSource>(
     )?;
 
     set_noise_factors(&mut stones, &windows);
+    let shared: Vec<f64> = windows
+        .iter()
+        .map(|w| w.as_deref().map_or(1.0, Window::shared))
+        .collect();
+    for (stone, hidden) in stones.iter_mut().zip(hidden(&shared)) {
+        stone.hidden = where_on("partial", hidden.max(missing(stone.counts)), 0.0);
+    }
     sample.retain(|(i, _)| stones[*i].noise_factors == [1.0; 2]);
     let keep = sample.len().div_ceil(SAMPLE).max(1);
 
@@ -162,6 +172,7 @@ impl StoneInfo {
             shift: pair.centroid_second - pair.centroid,
             counts,
             noise_factors: [1.0; 2],
+            hidden: 0.0,
             sources: pair.window.as_deref().map_or_else(Default::default, shares),
             usable: counts.iter().all(|&n| n >= params.min_points),
         }

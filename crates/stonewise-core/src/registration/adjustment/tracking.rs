@@ -2,7 +2,7 @@
 
 use super::candidate::{CandidateMotion, Moving};
 use super::error::AdjustError;
-use super::field::{LEAST_APPEARANCE_M, Prediction, START_APPEARANCE_M, posterior};
+use super::field::{LEAST_APPEARANCE_M, Prediction, START_APPEARANCE_M, log_odds_of_loose, posterior};
 use super::observation::NormalEquations;
 use super::observation::photo::{
     CloudMotion, FaceShift, PhotoModel, PhotoReport, StoneInPhotos, StonePhotos,
@@ -240,6 +240,17 @@ impl Adjustment {
             .unwrap_or_else(Matrix3::zeros);
         let share = (by_clouds + information).try_inverse()? * information;
         Some(PhotoPart { stone, share })
+    }
+
+    /// Whether a stone's photos alone make it more probable that it is loose than that it moves as
+    /// `prediction` says.
+    pub fn photos_show_own_motion(&self, i: usize, prediction: &Prediction) -> bool {
+        let own = [self.prior.own_variances(), self.prior.loose_variances()];
+        let [with_field, on_own] =
+            [Moving::WithField, Moving::OnOwn].map(|moving| self.observed_by_photos(i, moving));
+        with_field.zip(on_own).is_some_and(|(with_field, on_own)| {
+            log_odds_of_loose([&with_field, &on_own], prediction, &own, self.prior.loose.share) > 0.0
+        })
     }
 
     /// What photos contributed; `results`: of all stones, in their order.

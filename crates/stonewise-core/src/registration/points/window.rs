@@ -31,6 +31,8 @@ pub struct Window {
     noise_m: [f64; 2],
     /// Sources of each epoch's labelled points, with the number of points of each.
     sources: [BTreeMap<u32, usize>; 2],
+    /// Share of the labelled points that lie inside the other epoch's outlines, of the epoch in which it is less.
+    shared: f64,
 }
 
 impl Window {
@@ -48,6 +50,7 @@ impl Window {
         let first = Face::new(labelled[0], &face_from_world, &Vector3::zeros())?;
         let second = Face::new(labelled[1], &face_from_world, shift)?;
         let rings = [&first.rings, &second.rings].map(|rings| RingIndex::new(rings));
+        let shared = first.share_in(&rings[1]).min(second.share_in(&rings[0]));
 
         Some(Self {
             face_from_world,
@@ -62,6 +65,7 @@ impl Window {
             noise_m: [first.noise_m, second.noise_m],
             sources,
             rings,
+            shared,
         })
     }
 
@@ -73,6 +77,11 @@ impl Window {
     /// Noise of each epoch's points along the normal, about, metres.
     pub(crate) fn noise_m(&self) -> [f64; 2] {
         self.noise_m
+    }
+
+    /// Share of the stone that both epochs show.
+    pub(crate) fn shared(&self) -> f64 {
+        self.shared
     }
 
     /// Sources of each epoch's labelled points, with the number of points of each.
@@ -113,6 +122,7 @@ impl Window {
 
 /// Outlines, noise and depth of a stone's labelled points in one epoch.
 struct Face {
+    flat: Vec<Point2<f64>>,
     rings: Vec<Vec<Point2<f64>>>,
     noise_m: f64,
     /// Lowest and highest place of all but the tails.
@@ -137,10 +147,17 @@ impl Face {
         heights.sort_by(f64::total_cmp);
         let tail = (DEPTH_TAIL * heights.len() as f64) as usize;
         Some(Self {
+            flat,
             rings,
             noise_m,
             depth: [heights[tail], heights[heights.len() - 1 - tail]],
         })
+    }
+
+    /// Share of its points inside some rings.
+    fn share_in(&self, rings: &RingIndex) -> f64 {
+        let inside = self.flat.iter().filter(|p| rings.contains(p)).count();
+        inside as f64 / self.flat.len().max(1) as f64
     }
 }
 

@@ -79,7 +79,7 @@ fn around_m2(stones: &[&StoneRow]) -> f64 {
     SQUARE_M * SQUARE_M * all.len() as f64
 }
 
-/// A part of the wall that is too large to be a mistake of some masks shows another surface in each epoch.
+/// A part of the wall that is too large to be a mistake of some masks has no motion because nothing confirms it.
 pub(super) fn refused(rows: &[StoneRow]) -> Check {
     let mut parts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for row in rows.iter().filter(|r| r.status == Status::FailedDisagreement) {
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn a_part_of_ten_stones_that_the_epochs_show_unlike_is_a_doubt() {
+    fn a_part_of_ten_stones_that_nothing_confirms_is_a_doubt() {
         let mut rows = rows();
         for row in &mut rows[..10] {
             row.status = Status::FailedDisagreement;

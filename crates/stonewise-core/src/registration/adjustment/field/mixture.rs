@@ -9,12 +9,14 @@ use rayon::prelude::*;
 /// Probability of each stone to move with the field, given all others.
 ///
 /// `on_own`: equations at the stone's own optimum, where that is followed; a loose stone's likelihood is
-/// taken there. `shared`: variances of errors that look like a stone's own motion.
+/// taken there. `shared`: variances of errors that look like a stone's own motion; `shares`: probability of each
+/// stone to leave the field, beforehand.
 pub(crate) fn probabilities_with_field(
     problem: &FieldProblem,
     on_own: &[Option<&NormalEquations>],
     field: &Field,
     shared: &[f64; 6],
+    shares: &[f64],
 ) -> Vec<f64> {
     let own: [[f64; 6]; 2] = problem
         .own_variances()
@@ -24,7 +26,7 @@ pub(crate) fn probabilities_with_field(
         .map(|i| {
             let equations = problem.stones[i].equations;
             let both = [equations, on_own[i].unwrap_or(equations)];
-            1.0 / (1.0 + log_odds_of_loose(both, &field.from_others[i], &own, problem.loose.share).exp())
+            1.0 / (1.0 + log_odds_of_loose(both, &field.from_others[i], &own, shares[i]).exp())
         })
         .collect()
 }
@@ -34,7 +36,7 @@ pub(crate) fn probabilities_with_field(
 ///
 /// `own`: variances of what it does beside `prediction` in either case; `share`: expected share of loose
 /// stones.
-fn log_odds_of_loose(
+pub(crate) fn log_odds_of_loose(
     equations: [&NormalEquations; 2],
     prediction: &Prediction,
     own: &[[f64; 6]; 2],
@@ -67,7 +69,13 @@ mod tests {
         }
         let problem = wall.problem(1.0);
         let field = solve(&problem).unwrap();
-        let found = probabilities_with_field(&problem, &[None; 20], &field, &[0.0; 6]);
+        let found = probabilities_with_field(
+            &problem,
+            &[None; 20],
+            &field,
+            &[0.0; 6],
+            &[problem.loose.share; 20],
+        );
         for (i, (p, prediction)) in found.iter().zip(&field.from_others).enumerate() {
             let density = |own: [f64; 6]| {
                 let noise = Matrix6::from_diagonal(&(Vector6::from(own) + weights.map(|w| 1.0 / w)));

@@ -30,7 +30,7 @@ pub(crate) use field_vector::Vector9;
 pub(crate) use field_vector::{FieldVector, Matrix9, stone_from_field};
 pub(crate) use graph::{Edge, Graph, Node, Place};
 pub(crate) use loose_prior::{LoosePrior, estimated_share};
-pub(crate) use mixture::probabilities_with_field;
+pub(crate) use mixture::{log_odds_of_loose, probabilities_with_field};
 pub(crate) use motion_prior::MotionPrior;
 pub(crate) use posterior::{Posterior, Prediction, covariance_against, posterior};
 pub(crate) use prior::{Tie, of_tie};
