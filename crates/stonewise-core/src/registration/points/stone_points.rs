@@ -183,6 +183,28 @@ mod tests {
     }
 
     #[test]
+    fn what_one_epoch_alone_shows_is_not_shared() {
+        let cut = |low: f64, high: f64, seed: u64| {
+            let mut near = seen_from(0.0, &Vector3::zeros(), seed);
+            let is_shown = |p: &NearPoint| p.offset[2] > low as f32 && p.offset[2] < high as f32;
+            near.iter_mut().for_each(|p| p.labelled &= is_shown(p));
+            near
+        };
+        // A part of the face, and parts of equal size that overlap by half, of 0.4 m.
+        for ([first, second], expected) in [
+            ([[-0.2, 0.2], [-0.2, 0.2]], 1.0),
+            ([[-0.2, 0.2], [-0.2, -0.1]], 0.25),
+            ([[-0.2, -0.1], [-0.2, 0.2]], 0.25),
+            ([[-0.2, 0.0], [-0.1, 0.1]], 0.5),
+        ] {
+            let (first, second) = (cut(first[0], first[1], 1), cut(second[0], second[1], 2));
+            let found = stone_points([&first, &second], &Vector3::x(), &Vector3::zeros(), 3.0);
+            let shared = found.window.unwrap().shared();
+            assert!((shared - expected).abs() < 0.03, "{shared} {expected}");
+        }
+    }
+
+    #[test]
     fn no_epoch_is_treated_unlike_the_other() {
         let shift = Vector3::new(0.03, 0.01, -0.02);
         let (first, second) = (seen_from(1.0, &Vector3::zeros(), 1), seen_from(-1.0, &shift, 2));
