@@ -49,10 +49,16 @@ impl Warning {
         }
     }
 
+    /// Subject and message, in English where there are no words in this language.
+    pub fn text(&self, language: Language) -> String {
+        let german = self.german.as_ref().filter(|_| language == Language::German);
+        format!("{}: {}", self.subject, german.unwrap_or(&self.message))
+    }
+
     /// Subject, message and code in one line.
-    pub fn line(&self) -> String {
+    pub fn line(&self, language: Language) -> String {
         let code = self.code.iter().map(|code| format!(" [{code}]"));
-        format!("{}: {}{}", self.subject, self.message, code.collect::<String>())
+        format!("{}{}", self.text(language), code.collect::<String>())
     }
 }
 

@@ -46,12 +46,6 @@ impl Said {
         german.filter(|_| language == Language::German)
     }
 
-    /// The English sentence and its code in one line.
-    pub fn line(&self) -> String {
-        let code = self.code.iter().map(|code| format!(" [{code}]"));
-        format!("{}{}", self.english, code.collect::<String>())
-    }
-
     /// The sentence, and another behind it, in English and in German.
     #[must_use]
     pub fn and(self, [english, german]: [&str; 2]) -> Self {

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use std::path::Path;
 use stonewise::check::require_memory_of_clouds;
 use stonewise::results::names::DATA_DIR;
-use stonewise::{Comparison, Error, OutputFolder, Owner, Project, compare_clouds};
+use stonewise::{Comparison, Error, Language, OutputFolder, Owner, Project, compare_clouds};
 use stonewise_core::change::{M3c2Params, params_from_cloudcompare};
 
 /// Compares the clouds of a project, two clouds, or a cloud and a mesh.
@@ -73,7 +73,7 @@ fn compare_as(
     let warnings = compare_clouds(project, what, &folder, Path::new(below), printer)?;
     printer.finish();
     for doubt in warnings.iter().filter(|w| w.doubt) {
-        printer.log(&format!("DOUBT: {}", doubt.line()));
+        printer.log(&format!("DOUBT: {}", doubt.line(Language::English)));
     }
     printer.log(&format!("results: {}", folder.path().display()));
     Ok(match warnings.iter().any(|w| w.doubt) {

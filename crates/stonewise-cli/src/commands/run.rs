@@ -9,8 +9,7 @@ use stonewise::results::names::PairFile;
 use stonewise::results::records::{EpochVerdict, State};
 use stonewise::results::{Status, StoneRow};
 use stonewise::{
-    Language, OutputFolder, PREVIOUS_DIR, PROJECT_STEP, Project, ScansProject, Summary, Until, Warning,
-    is_scan,
+    Language, OutputFolder, PREVIOUS_DIR, PROJECT_STEP, Project, ScansProject, Summary, Until, is_scan,
 };
 use stonewise_core::progress::Progress;
 
@@ -172,24 +171,13 @@ impl Words {
             Language::German => &GERMAN,
         }
     }
-
-    /// Subject and message of a warning.
-    fn warning(&self, warning: &Warning) -> String {
-        let german = warning
-            .german
-            .as_ref()
-            .filter(|_| self.language == Language::German);
-        format!("{}: {}", warning.subject, german.unwrap_or(&warning.message))
-    }
 }
 
 /// Prints in a few lines what came out, without the notes on the project file. Doubts come first, also with `--quiet`.
 pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
     let words = Words::of(project);
     for doubt in summary.doubts() {
-        let code = doubt.code.iter().map(|code| format!(" [{code}]"));
-        let code = code.collect::<String>();
-        printer.always(&format!("{}: {}{code}", words.doubt, words.warning(doubt)));
+        printer.always(&format!("{}: {}", words.doubt, doubt.line(words.language)));
     }
     for warning in summary
         .warnings
@@ -201,7 +189,7 @@ pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
         } else {
             words.note
         };
-        printer.remark(word, &words.warning(warning), warning.code.as_deref());
+        printer.remark(word, &warning.text(words.language), warning.code.as_deref());
     }
     for (epoch, pair) in project.epochs.iter().skip(1).zip(&summary.pairs) {
         if pair.rows.is_empty() {

@@ -8,7 +8,7 @@ use crate::stdout::stdout;
 use anyhow::{Result, bail};
 use std::io::Write;
 use stonewise::segmentation::{FolderJob, MaskEvaluation, require_memory, segment_folder};
-use stonewise::{OutputFolder, Owner, Until};
+use stonewise::{Language, OutputFolder, Owner, Until};
 use stonewise_core::params::Params;
 use stonewise_segment::Weights;
 use stonewise_segment::dataset::Reference;
@@ -88,7 +88,7 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
     )?;
     printer.finish();
     for warning in &summary.warnings {
-        printer.log(&format!("skipped: {}", warning.line()));
+        printer.log(&format!("skipped: {}", warning.line(Language::English)));
     }
 
     printer.log(&format!(
