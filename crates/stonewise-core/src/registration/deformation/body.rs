@@ -160,8 +160,7 @@ impl<'a> Body<'a> {
         add_octaves(&mut shared, motions, &stones);
         if let Some(matching) = errors.and_then(|(errors, _)| errors.matching.as_ref()) {
             let root_of = |stone: &BodyStone| {
-                let place = number.get(&stone.id);
-                place.map_or_else(Matrix3::zeros, |&k| root(&matching.covariances[k]))
+                error_of(stone.id).map_or_else(Matrix3::zeros, |(_, k)| root(&matching.covariances[k]))
             };
             let roots: Vec<Matrix3<f64>> = stones.iter().map(root_of).collect();
             add_patches(&mut shared, &stones, [0.5 * matching.length_m, 2.0], &roots);

@@ -12,7 +12,7 @@ pub struct JointErrors {
     pub(crate) rows: Vec<Row>,
     /// Covariance of the unknowns; second moments where the error is not taken off the motions.
     pub(crate) covariance: DMatrix<f64>,
-    /// Covariance of each stone's independent error.
+    /// Covariance of each stone's independent error, which lies out of its face.
     pub(crate) own: Vec<Matrix3<f64>>,
     /// Expectation of the error of each stone's points where it is taken off the motions; else zero.
     pub(crate) mean: Vec<Vector3<f64>>,
