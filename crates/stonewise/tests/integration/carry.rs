@@ -168,14 +168,20 @@ fn stones_in_the_dark_are_measured_by_their_surface() {
     let found = stones(&project, &out, true);
     let carried: Vec<&StoneRow> = found.iter().filter(|s| s.carried_from.is_some()).collect();
     let measured: Vec<_> = carried.iter().filter(|s| s.status == Status::Ok).collect();
-    let again = measured.iter().filter(|s| missed.contains(&s.stone_id)).count();
-    assert!(3 * again > 2 * missed.len(), "{again} of {}", missed.len());
+    let mut well_measured = 0;
     for stone in measured {
         let motion = stone.motion.as_ref().unwrap();
-        let error = (motion.displacement - Vector3::from(MOTION)).norm();
-        assert!(error < 0.002, "stone {}: {error}", stone.stone_id);
+        let error = motion.displacement - Vector3::from(MOTION);
+        // Few points reach some of them, at the foot of the wall: their deviations say so.
+        let variances = motion.covariance.diagonal();
+        let is_within = (0..3).all(|axis| error[axis].abs() < 3.0 * variances[axis].sqrt());
+        assert!(is_within, "stone {}: {error:?} {variances:?}", stone.stone_id);
+        let is_close = error.norm() < 0.002;
+        well_measured += usize::from(is_close && missed.contains(&stone.stone_id));
         assert_eq!(stone.carried_from, Some(1));
     }
+    let sought = missed.len();
+    assert!(3 * well_measured > 2 * sought, "{well_measured} of {sought}");
     let audit = fs::read_to_string(out.join("data/audit_carried.csv")).unwrap();
     let listed = audit
         .lines()
