@@ -6,6 +6,11 @@
 //! photo. The stone behind every sample of the canvas is looked up, so the cost goes with the pixels and not
 //! with the size of the wall.
 //!
+//! `stonewise-simulate` draws masonry, too, and the two stay apart. There, one wall of solid stones in metres must meet
+//! scanners, cameras and shadows of all epochs at the same surface. Here, hundreds of thousands of photos need bonds,
+//! arches, ruins and clutter that no survey needs, and the built-in weights belong to their bytes. As the two share no
+//! stone, texture or light, simulated surveys test the detector on walls that it did not learn from.
+//!
 //! Lengths are pixels of the photo unless a field says otherwise; pixel (0, 0) covers `[0, 1) x [0, 1)`.
 
 mod backdrop;
