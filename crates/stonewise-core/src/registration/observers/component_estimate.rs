@@ -1,4 +1,4 @@
-//! Estimation of the variances of the sources' errors, by restricted maximum likelihood from differences
+//! Estimation of the variances of the sources' errors, by restricted maximum likelihood (REML) from differences
 //! within the epochs.
 
 use super::components::{BOUNDS, COUNT, ObserverComponents, SensorClass};

@@ -14,7 +14,7 @@
 //! 2006, eq. 4.17) at knots (Glira, Pfeifer & Mandlburger 2016 use splines in the same place); g_e: error of
 //! the whole epoch, which no comparison of its own sources shows. Within one epoch nothing moves, so
 //! differences between its sources on the same stone are differences of errors. Their variances are estimated
-//! from these alone (restricted maximum likelihood), then held; stable areas, which both epochs see unmoved,
+//! from these alone (restricted maximum likelihood, REML), then held; stable areas, which both epochs see unmoved,
 //! add differences between the epochs. What comes out is the error of the second epoch against the first at
 //! every stone, with its covariance: an epoch's mean error stays as uncertain as its prior where nothing shows
 //! it. Where nothing shows the datum at all, motions hold against the common rigid motion of the stones, and

@@ -1,4 +1,4 @@
-//! Noise of the points and roughness of the stones, by restricted maximum likelihood.
+//! Noise of the points and roughness of the stones, by restricted maximum likelihood (REML).
 
 use super::layout::Layout;
 use super::local_motion::LocalMotion;
