@@ -72,8 +72,6 @@ pub struct StoneMotion {
     pub relative: Vector3<f64>,
     /// Covariance of `relative`, m^2.
     pub relative_covariance: Matrix3<f64>,
-    /// Probability that a stone which moves with its neighbours departs this far from what they predict.
-    pub own_motion_p: f64,
     /// Moves unlike its neighbours, significantly (false discovery rate controlled).
     pub loose: bool,
     /// Posterior probability that the stone is loose; `None` where the estimator gives none.

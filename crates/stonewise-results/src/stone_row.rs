@@ -418,7 +418,6 @@ mod tests {
                 poses: Matrix3::identity() * 5e-7,
             },
             relative: Vector3::zeros(),
-            own_motion_p: 1.0,
             relative_covariance: Matrix3::identity(),
             loose: false,
             p_loose: Some(0.01),

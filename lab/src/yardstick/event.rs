@@ -28,6 +28,10 @@ pub enum Event {
     Repairs,
     /// Only the wall left of y = 0.3 was measured.
     Half,
+    /// Of one stone in ten, photos show the upper third alone.
+    Thirds,
+    /// Neither epoch shows what lies around a few stones at the right end.
+    Apart,
     /// Plastered panels of a hut before the wall pass for stones in both epochs, and move by this.
     Hut(f64),
     /// A door leaf passes for a stone, and is open by this angle in radians.
@@ -78,6 +82,10 @@ impl Event {
                 });
             }
             Self::Half => keep(wall, &[1], |p| p.y < 0.3),
+            Self::Thirds => thirds(wall),
+            Self::Apart => keep(wall, &[0, 1], |p| {
+                p.y < 0.2 || (p.y > 0.8 && (0.8..1.3).contains(&p.z))
+            }),
             Self::Hut(moved_m) => {
                 for k in 0..6 {
                     let corner = Point3::new(
@@ -183,6 +191,17 @@ fn spoil(wall: &mut Wall) {
         }
         let touched = [id, next];
         mark_odd(wall, if k % 3 == 1 { &touched[..1] } else { &touched });
+    }
+}
+
+fn thirds(wall: &mut Wall) {
+    for [id, _] in some(wall, 10) {
+        let Some(points) = wall.epochs[1].get_mut(&id) else {
+            continue;
+        };
+        points.sort_by(|a, b| b.place.z.total_cmp(&a.place.z));
+        points.truncate(points.len() / 3);
+        mark_odd(wall, &[id]);
     }
 }
 

@@ -13,8 +13,9 @@ use stonewise_core::registration::observers::{
 };
 use stonewise_core::registration::{
     AdjustmentParams, AdjustmentReport, Deformation, DeformationZone, MemoryPairs, StoneDeformation, adjust,
-    deformation, moved_stones,
+    deformation,
 };
+use stonewise_core::statistics::{chi_square_p, discoveries};
 use stonewise_core::stone::StoneMotion;
 
 /// Width of a stone's border, in noise levels, where a point's place decides and not its label; as in a run.
@@ -164,16 +165,20 @@ fn found(wall: &Wall, pair: &Pair) -> BTreeMap<StoneId, Found> {
     let of_errors = common(&|k| corrected(k).0 - displacement(k));
     let tested = |k: usize| {
         let (moved, spread) = corrected(k);
-        Some(match is_known {
+        match is_known {
             true => (moved, spread),
             false => (
                 moved - of_motions.at(place(k)),
                 spread + of_motions.covariance_at(place(k)),
             ),
-        })
+        }
     };
-    let tested: Vec<_> = all.clone().map(tested).collect();
-    let moved = moved_stones(&tested, FALSE_DISCOVERIES);
+    let p_still = |k: usize| {
+        let (moved, spread) = tested(k);
+        Some(chi_square_p(moved.dot(&spread.cholesky()?.solve(&moved)), 3))
+    };
+    let p_values: Vec<Option<f64>> = all.clone().map(p_still).collect();
+    let moved: BTreeSet<usize> = discoveries(&p_values, FALSE_DISCOVERIES).into_iter().collect();
     let deformed = true_deformations(wall, pair);
     let claim = |k: usize| {
         let face = FaceFrame::from_normal(&truth(k).normal).face_from_world();
@@ -191,7 +196,7 @@ fn found(wall: &Wall, pair: &Pair) -> BTreeMap<StoneId, Found> {
         let own = displacement(k) - truth(k).shared;
         let of_stone = Found {
             is_called_loose: motion(k).loose,
-            is_called_moved: moved[k],
+            is_called_moved: moved.contains(&k),
             absolute: is_known.then(|| in_face((error, spread))),
             free: in_face((error - of_errors.at(place(k)), spread + rigid)),
             relative: in_face((motion(k).relative - own, motion(k).relative_covariance)),

@@ -127,11 +127,11 @@ fn happened(name: &str) -> Vec<WallMotion> {
 /// What else happens: its name, what measures it, the motion of the stones, and what is changed in the plan.
 type Kind = (&'static str, &'static [&'static str], &'static str, fn(&mut Plan));
 
-/// Mechanisms by what happens: `probe` far; `covered`, `foreign` ivy; `partial` car, snow, half; `two_surfaces`
-/// partners, masks; `bodies` buttress, door; `sensors` other_sensor; `correlation`, `stone_factor`, `slopes` lines;
+/// Mechanisms by what happens: `probe` far; `covered`, `foreign` ivy; `partial` car, snow, half, thirds; `two_surfaces`
+/// partners, masks; `bodies` buttress, door, apart; `sensors` other_sensor; `correlation`, `stone_factor`, `slopes` lines;
 /// `crack`, `across` crack; `zone` creep; `octaves_shown`, `shared` photos; `obs_*` every survey with sources, above all
 /// stable, merged and the faults of sources at the end.
-const KINDS: [Kind; 32] = [
+const KINDS: [Kind; 35] = [
     ("masks", &["tls", "uav", "photos"], "combo", |p| {
         p.events.push(Event::Masks)
     }),
@@ -146,6 +146,20 @@ const KINDS: [Kind; 32] = [
     ("snow", &["tls"], "still", |p| p.events.push(Event::Snow)),
     ("car", &["tls", "uav"], "loose", |p| p.events.push(Event::Car)),
     ("half", &["tls"], "still", |p| p.events.push(Event::Half)),
+    ("thirds", &["tls", "uav", "photos"], "still", |p| {
+        p.events.push(Event::Thirds)
+    }),
+    ("apart", &["tls", "uav", "photos"], "still", |p| {
+        p.events.push(Event::Apart)
+    }),
+    ("single", &["tls", "uav", "photos"], "still", |p| {
+        p.motions = vec![WallMotion::Loose {
+            share: 0.0,
+            at_least: 1,
+            shift_m: [0.005, 0.03],
+            rotation_rad: 0.035,
+        }]
+    }),
     ("repairs", &["tls"], "still", |p| p.events.push(Event::Repairs)),
     ("hut", &["uav"], "still", |p| p.events.push(Event::Hut(0.0))),
     ("moving_hut", &["tls", "uav"], "still", |p| {

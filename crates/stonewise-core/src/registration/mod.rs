@@ -9,7 +9,6 @@ mod deformation;
 mod gicp;
 mod least_deviance;
 mod modes;
-mod moved;
 pub mod observers;
 mod octave_patches;
 pub mod photos;
@@ -24,7 +23,6 @@ pub use deformation::{
     Against, Deformation, DeformationZone, StoneDeformation, ZONE_EXTENTS_M, ZoneKind, deformation,
 };
 pub use gicp::{GicpBlock, GicpParams, GicpStone, align, relate_to_neighbours};
-pub use moved::moved_stones;
 pub use points::{
     MatchedPair, MemoryPairs, NearPoint, PairPlaces, PairPoints, PairSource, StoneExtents, StonePoints,
     Window, choose_points, local_shifts, stone_points,

@@ -12,7 +12,7 @@ use super::observation::NormalEquations;
 use super::observation::surface::Equations;
 use super::octaves::Octaves;
 use super::params::{AdjustmentReport, Break};
-use super::significance::{Tested, test_stones};
+use super::significance::loose_stones;
 use super::solution::Solution;
 use super::state::Adjustment;
 use crate::geometry::Rigid3;
@@ -77,20 +77,20 @@ pub(crate) fn report(
 
 impl Found {
     fn of(adjustment: &Adjustment, solution: &Solution) -> Self {
-        let tested = test_stones(adjustment, solution);
+        let loose = loose_stones(adjustment);
         let shared = adjustment.shared_variances(1.0);
         let covered = covered(adjustment);
         let estimates = estimates(adjustment, solution, &shared, &covered);
         let octaves = Octaves::of(adjustment, |i| {
-            let estimate = estimates[i].as_ref().ok().filter(|_| !tested[i].is_loose)?;
+            let estimate = estimates[i].as_ref().ok().filter(|_| !loose[i])?;
             Some((estimate.mean + adjustment.prior.common_in(i)).translation())
         });
         let poses = octaves.of_poses(adjustment);
-        let mut results = results(adjustment, solution, &tested, &estimates, (&octaves, &poses));
+        let mut results = results(adjustment, solution, &loose, &estimates, (&octaves, &poses));
         leave_out_covered(&covered, &mut results);
         refuse_unconfirmed(adjustment, &mut results);
         Self {
-            breaks: find_breaks(adjustment, &solution.field.state, |i| tested[i].is_loose),
+            breaks: find_breaks(adjustment, &solution.field.state, |i| loose[i]),
             neighbours: neighbour_covariances(adjustment, solution, &results, &estimates, (&octaves, &poses)),
             common_covariance: common_covariance(adjustment, solution, &shared),
             joint: Some(joint_motions(
@@ -142,7 +142,7 @@ fn estimates(
 fn results(
     adjustment: &Adjustment,
     solution: &Solution,
-    tested: &[Tested],
+    loose: &[bool],
     estimates: &[Result<Estimate, MotionFailure>],
     (octaves, poses): (&Octaves, &DMatrix<f64>),
 ) -> Vec<PairResult> {
@@ -161,7 +161,7 @@ fn results(
                         adjustment,
                         i,
                         solution,
-                        tested[i],
+                        loose[i],
                         estimate,
                         (&shared, octaves, poses),
                     );
@@ -226,7 +226,7 @@ fn motion(
     adjustment: &Adjustment,
     i: usize,
     solution: &Solution,
-    tested: Tested,
+    is_loose: bool,
     estimate: &Estimate,
     (shared, octaves, poses): (&[f64; 6], &Octaves, &DMatrix<f64>),
 ) -> StoneMotion {
@@ -263,8 +263,7 @@ fn motion(
         },
         relative: displacement - expected,
         relative_covariance: world * estimate.relative_covariance * world.transpose(),
-        own_motion_p: tested.p_value,
-        loose: tested.is_loose,
+        loose: is_loose,
         p_loose: Some(adjustment.p_loose(&adjustment.stones[i])),
         observability: observability(&solution.equations[i].with_field),
         rmse_m: equations.map_or(f64::NAN, |e| e.rms_m),
@@ -356,7 +355,6 @@ mod tests {
             shared: SharedParts::default(),
             relative: Vector3::zeros(),
             relative_covariance: Matrix3::zeros(),
-            own_motion_p: 1.0,
             loose: false,
             p_loose: None,
             observability: 1.0,

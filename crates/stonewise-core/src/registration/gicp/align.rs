@@ -62,7 +62,6 @@ fn align_one(
         covariance,
         shared: SharedParts::default(),
         relative: Vector3::zeros(),
-        own_motion_p: 1.0,
         relative_covariance: Matrix3::zeros(),
         loose: false,
         p_loose: None,

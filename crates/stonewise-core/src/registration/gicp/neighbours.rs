@@ -12,7 +12,7 @@ const MAD_TO_VARIANCE: f64 = 1.4826 * 1.4826;
 /// A neighbour lies within this distance, metres: farther stones move by another part of the wall.
 const FAR_M: f64 = 5.0;
 
-/// Fills in `relative`, `relative_covariance`, `own_motion_p` and `loose` of every measured stone.
+/// Fills in `relative`, `relative_covariance` and `loose` of every measured stone.
 ///
 /// `stones`: each with its centroid in the first epoch, world. The motion that a stone should have is the median, axis
 /// by axis, of its nearest measured neighbours; its variance is that of a median of as many values (pi / 2k
@@ -28,6 +28,7 @@ pub fn relate_to_neighbours(stones: &mut [(Point3<f64>, PairResult)], params: &G
         .iter()
         .map(|m| (m.displacement, m.covariance.fixed_view::<3, 3>(0, 0).into_owned()))
         .collect();
+    let mut p_values = Vec::with_capacity(motions.len());
     for (m, motion) in motions.iter_mut().enumerate() {
         let near = index.nearest_k(&places[m], params.neighbours + 1, FAR_M);
         let others = near.iter().filter(|n| n.0 != m).map(|n| absolute[n.0]);
@@ -36,9 +37,8 @@ pub fn relate_to_neighbours(stones: &mut [(Point3<f64>, PairResult)], params: &G
         motion.relative_covariance = absolute[m].1 + covariance;
         let factor = motion.relative_covariance.cholesky();
         let square = factor.map(|f| motion.relative.dot(&f.solve(&motion.relative)));
-        motion.own_motion_p = square.map_or(1.0, |square| chi_square_p(square, 3));
+        p_values.push(Some(square.map_or(1.0, |square| chi_square_p(square, 3))));
     }
-    let p_values: Vec<Option<f64>> = motions.iter().map(|m| Some(m.own_motion_p)).collect();
     for i in discoveries(&p_values, params.false_discovery_rate) {
         motions[i].loose = true;
     }

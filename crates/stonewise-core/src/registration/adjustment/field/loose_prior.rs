@@ -2,10 +2,9 @@
 
 use super::variance_components::VarianceComponents;
 
-/// So many stones would tell as much of the share of loose stones as is expected beforehand. 300: on a wall
-/// of that many stones none of which is loose, half of the expected share is left; on walls of thousands the
-/// stones decide.
-const STONES_EXPECTED: f64 = 300.0;
+/// Loose stones that are expected beforehand tell as much as half a stone that is found (Jeffreys 1946): on a wall of
+/// any size the first loose stone must show itself more clearly than the tenth.
+const LOOSE_EXPECTED: f64 = 0.5;
 
 /// The component of the mixture that loose stones belong to.
 #[derive(Clone, Copy, Debug)]
@@ -31,12 +30,12 @@ impl LoosePrior {
 }
 
 /// Share of loose stones, from the probability of each decided stone to be loose: one step of expectation
-/// maximisation (Dempster, Laird & Rubin 1977) with a beta prior whose mode is about `expected`.
+/// maximisation (Dempster, Laird & Rubin 1977) with a beta prior whose mean is `expected`.
 ///
 /// Never above `expected`: before field and noise have settled, many stones look loose.
 pub(crate) fn estimated_share(expected: f64, p_loose: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = p_loose.fold((0.0, 0.0), |(sum, count), p| (sum + p, count + 1.0));
-    let share = (STONES_EXPECTED * expected + sum) / (STONES_EXPECTED + count);
+    let share = expected * (LOOSE_EXPECTED + sum) / (LOOSE_EXPECTED + expected * count);
     share.min(expected)
 }
 
@@ -49,9 +48,11 @@ mod tests {
         let share = |loose: usize, stones: usize| {
             estimated_share(0.03, (0..stones).map(|i| f64::from(u8::from(i < loose))))
         };
+        // As 0.5 loose stones of 0.5 / 0.03 would tell.
+        let expected = |loose: f64, stones: f64| (0.5 + loose) / (0.5 / 0.03 + stones);
         assert!((share(0, 0) - 0.03).abs() < 1e-15);
-        assert!((share(0, 300) - 0.015).abs() < 1e-15);
-        assert!((share(1, 9700) - 0.001).abs() < 1e-15);
+        assert!((share(0, 300) - expected(0.0, 300.0)).abs() < 1e-15);
+        assert!((share(1, 9700) - expected(1.0, 9700.0)).abs() < 1e-15);
         assert!((share(50, 100) - 0.03).abs() < 1e-15);
     }
 }

@@ -103,7 +103,6 @@ mod tests {
             shared: SharedParts::default(),
             relative: Vector3::zeros(),
             relative_covariance: Matrix3::zeros(),
-            own_motion_p: 1.0,
             loose: false,
             p_loose: None,
             observability: 1.0,
