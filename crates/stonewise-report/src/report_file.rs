@@ -566,20 +566,31 @@ mod tests {
         let doubtful = folder(&rows());
         write_json(&doubtful.path().join(RUN), &run_record("Wall", &["A", "B"])).unwrap();
         let course = series(Language::English);
-        let trends: TrendsRecord =
-            serde_json::from_reader(std::fs::File::open(course.path().join(TRENDS)).unwrap()).unwrap();
+        let trends = std::fs::read(course.path().join(TRENDS)).unwrap();
+        let trends: TrendsRecord = serde_json::from_slice(&trends).unwrap();
         let verdict = Verdict::new(&Thresholds::default(), Vec::new());
         let verdict = verdict.with_series(Some(crate::verdict::answers(&trends, texts)));
         write_json(&course.path().join(VERDICT), &verdict).unwrap();
-        for folder in [&sound, &doubtful, &course] {
+
+        for (folder, converged) in [(&sound, true), (&doubtful, false), (&course, true)] {
+            let mut registration = registration_record();
+            if let EstimatorRecord::Adjustment(adjustment) = &mut registration.estimator {
+                adjustment.converged = converged;
+            }
+            // What a run wrote in the language of its project.
+            for check in &mut registration.checks {
+                for text in [&mut check.what, &mut check.source] {
+                    *text = format!("\u{27e6}{text}\u{27e7}");
+                }
+            }
+            write_json(&folder.path().join("data/registration.json"), &registration).unwrap();
             let results = ResultSet::read(folder.path()).unwrap();
+            let results = ResultSet::read_pair(folder.path(), results.pairs).unwrap();
             let facts = Summary::in_texts(&results, texts);
-            let html = page(&results, &facts).unwrap();
-            assert!(html.contains("\u{27e6}"));
-            let unmarked = unmarked(&html);
-            assert!(unmarked.is_empty(), "{unmarked:?}");
-            if let Some(html) = yearly(&results, &facts) {
-                assert!(super::tests::unmarked(&html).is_empty(), "{html}");
+            let pages = [Some(page(&results, &facts).unwrap()), yearly(&results, &facts)];
+            for html in pages.into_iter().flatten() {
+                let words = unmarked(&html);
+                assert!(html.contains('\u{27e6}') && words.is_empty(), "{words:?}");
             }
         }
     }
