@@ -528,11 +528,9 @@ mod tests {
         }
         let mut report: Value = Language::English.read("report");
         mark(&mut report);
-        let texts = Texts::deserialize(&*Box::leak(Box::new(report))).unwrap();
-        Box::leak(Box::new(Texts {
-            decimal: ".",
-            ..texts
-        }))
+        let mut texts = Texts::deserialize(&*Box::leak(Box::new(report))).unwrap();
+        texts.decimal = ".";
+        Box::leak(Box::new(texts))
     }
 
     /// The words of a page that stand outside the marks.

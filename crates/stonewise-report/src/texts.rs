@@ -54,7 +54,7 @@ macro_rules! groups {
     )*) => {$(
         $(#[$doc])*
         #[derive(Debug, Default, Deserialize)]
-        #[serde(deny_unknown_fields, bound(deserialize = "'de: 'static"))]
+        #[serde(deny_unknown_fields)]
         pub(crate) struct $name {
             $(pub $text: &'static str,)*
             $($($(#[$of])* pub $field: $kind,)*)?

@@ -173,7 +173,7 @@ pub(super) fn map(results: &ResultSet, facts: &Summary) -> String {
     if results.courses.is_empty() {
         return String::new();
     }
-    let names = facts.texts.series;
+    let names = &facts.texts.series;
     let layout = MapLayout::new(results, facts.texts);
     let speed = |s: &StoneRow| results.courses.get(&s.stone_id).map(|c| c.velocity.norm());
     let picture = MapPicture {
