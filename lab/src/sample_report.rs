@@ -419,7 +419,7 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
             subject: "<script>.jpg".to_owned(),
             code: None,
             message: "cut off: \"'&".to_owned(),
-            german: None,
+            translations: Default::default(),
             skipped_input: true,
             doubt: false,
         }],

@@ -5,6 +5,7 @@ import { button, el } from "../src/dom.ts";
 import { fixed } from "../src/format.ts";
 import { Squares } from "../src/geometry.ts";
 import { Photos } from "../src/views/photos.ts";
+import { LANGUAGE } from "../src/texts.ts";
 import type { Action, Change, Edit, EditsShown, ProjectShown, State, StoneChange } from "./api.ts";
 import { changeList, countChanges } from "./changes.ts";
 import { type Live, newId, Refused, server } from "./client.ts";
@@ -509,7 +510,7 @@ function moment(when: string): string {
   const isDay = when.length <= 10, date = new Date(isDay ? `${when}T00:00` : when);
   if (Number.isNaN(date.getTime())) return when;
   // The month in letters: 11/12 is another day on either side of the Atlantic.
-  const place = document.documentElement.lang === "de" ? "de" : "en-GB";
+  const place = ["en-GB", "de", "fr"][LANGUAGE];
   return date.toLocaleString(place, { dateStyle: "medium", ...(isDay ? {} : { timeStyle: "short" }) });
 }
 

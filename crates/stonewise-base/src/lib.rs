@@ -6,6 +6,7 @@
 pub mod address_space;
 pub mod error;
 pub mod files;
+mod language;
 pub mod messages;
 mod parameters;
 pub mod part;

@@ -1,5 +1,6 @@
 //! `[report]` of the project file: what the first page of the report says about who measured with what.
 
+pub use crate::language::Language;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -22,28 +23,6 @@ pub struct ReportParams {
     pub logo: Option<PathBuf>,
     /// Language of the verdict and of the first page.
     pub language: Language,
-}
-
-/// A language of the texts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub enum Language {
-    /// English.
-    #[default]
-    #[serde(rename = "en")]
-    English,
-    /// German.
-    #[serde(rename = "de")]
-    German,
-}
-
-impl Language {
-    /// The tag of BCP 47.
-    pub fn tag(self) -> &'static str {
-        match self {
-            Self::English => "en",
-            Self::German => "de",
-        }
-    }
 }
 
 /// Largest logo, bytes: it is part of every report.

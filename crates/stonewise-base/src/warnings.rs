@@ -1,6 +1,6 @@
 //! What went wrong without stopping the run.
 
-use crate::messages::Said;
+use crate::messages::{Said, Translations, recorded};
 use crate::report_params::Language;
 use serde::{Deserialize, Serialize};
 use std::sync::{Mutex, PoisonError};
@@ -17,9 +17,9 @@ pub struct Warning {
     pub code: Option<String>,
     /// What happened, and what to do about it.
     pub message: String,
-    /// The message in German; in a record, only where its report is in German and there are German words.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub german: Option<String>,
+    /// The message in other languages; in a record, only in that of its report.
+    #[serde(default, skip_serializing_if = "Translations::is_empty")]
+    pub translations: Translations,
     /// An input of the project was left out: the run ends with exit code 3.
     pub skipped_input: bool,
     /// The results as a whole cannot be relied on: the run ends with exit code 3, and says so before anything
@@ -42,7 +42,11 @@ impl Warning {
             step: step.into(),
             code: message.code,
             message: without(message.english),
-            german: message.german.map(without),
+            translations: message
+                .translations
+                .into_iter()
+                .map(|(l, t)| (l, without(t)))
+                .collect(),
             subject,
             skipped_input: false,
             doubt: false,
@@ -51,8 +55,8 @@ impl Warning {
 
     /// Subject and message, in English where there are no words in this language.
     pub fn text(&self, language: Language) -> String {
-        let german = self.german.as_ref().filter(|_| language == Language::German);
-        format!("{}: {}", self.subject, german.unwrap_or(&self.message))
+        let message = self.translations.get(&language).unwrap_or(&self.message);
+        format!("{}{}{message}", self.subject, language.text("language.colon"))
     }
 
     /// Subject, message and code in one line.
@@ -94,11 +98,11 @@ impl Warnings {
 
     /// The sorted warnings as the record of a run keeps them whose report is in this language.
     pub fn recorded(&self, language: Language) -> Vec<Warning> {
-        let recorded = |warning: Warning| Warning {
-            german: Said::german_in(warning.german, language),
+        let keep = |warning: Warning| Warning {
+            translations: recorded(warning.translations, language),
             ..warning
         };
-        self.sorted().into_iter().map(recorded).collect()
+        self.sorted().into_iter().map(keep).collect()
     }
 
     /// All warnings so far, sorted, so that their order does not depend on threads.

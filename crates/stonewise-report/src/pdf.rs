@@ -2,6 +2,7 @@
 
 use super::browser::Browser;
 use super::page::{printed, yearly};
+use super::summary::Summary;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -79,8 +80,8 @@ impl Pdf {
     /// As [`Self::write`]; there are only two epochs.
     pub fn write_yearly(&self, dir: &Path, progress: &dyn Progress) -> Result<(), Error> {
         let pairs = ResultSet::read(dir)?.pairs;
-        let page = yearly(&ResultSet::read_pair(dir, pairs)?);
-        let page = page
+        let newest = ResultSet::read_pair(dir, pairs)?;
+        let page = yearly(&newest, &Summary::new(&newest))
             .ok_or_else(|| Error::Parameters("--yearly needs results of more than two epochs".to_owned()))?;
         self.print(&page, progress)
     }

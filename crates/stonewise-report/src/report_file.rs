@@ -1,6 +1,7 @@
 //! The report file.
 
 use super::page::{page, yearly};
+use super::summary::Summary;
 use super::tables::write_tables;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::Error;
@@ -21,7 +22,7 @@ pub fn write_report(dir: &Path) -> Result<PathBuf, Error> {
     let results = ResultSet::read(dir)?;
     let write = |results: &ResultSet| -> Result<PathBuf, Error> {
         let path = dir.join(PairFile::ReportPage.place(results.pair));
-        let page = page(results)?;
+        let page = page(results, &Summary::new(results))?;
         write_atomically(&path, |partial| std::fs::write(partial, page))
             .map_err(Error::io("writing the report", &path))?;
         Ok(path)
@@ -34,7 +35,10 @@ pub fn write_report(dir: &Path) -> Result<PathBuf, Error> {
     }
     if all.len() > 1 {
         write_tables(&dir.join(REPORT_DIR), &all)?;
-        if let Some(page) = all.last().and_then(yearly) {
+        if let Some(page) = all
+            .last()
+            .and_then(|newest| yearly(newest, &Summary::new(newest)))
+        {
             let path = dir.join(YEARLY);
             write_atomically(&path, |partial| std::fs::write(partial, page))
                 .map_err(Error::io("writing the report", &path))?;
@@ -47,8 +51,12 @@ pub fn write_report(dir: &Path) -> Result<PathBuf, Error> {
 mod tests {
     use super::*;
     use crate::testing::{folder, outlines, registration_record, rows, run_record};
+    use crate::texts::Texts;
+    use serde::Deserialize;
+    use serde_json::Value;
+    use std::collections::BTreeSet;
     use stonewise_base::files::write_json;
-    use stonewise_base::report_params::Language;
+    use stonewise_base::report_params::{Language, ReportParams};
     use stonewise_base::thresholds::Thresholds;
     use stonewise_base::warnings::Warning;
     use stonewise_core::evaluate::{Evaluation, EvaluationParams, score_motions};
@@ -251,7 +259,7 @@ mod tests {
             subject: "<script>.jpg".to_owned(),
             code: None,
             message: "'&'".to_owned(),
-            german: None,
+            translations: Default::default(),
             skipped_input: true,
             doubt: false,
         }];
@@ -469,8 +477,8 @@ mod tests {
         );
     }
 
-    /// The report of a wall that settled, of which nothing moved but the stones of these ids.
-    fn settled(moving: &[u32], params: &stonewise_base::report_params::ReportParams) -> String {
+    /// Results of a wall that settled, of which nothing moved but the stones of these ids.
+    fn settled_results(moving: &[u32], params: &ReportParams) -> tempfile::TempDir {
         let mut stones = rows();
         for stone in &mut stones {
             if let Some(motion) = stone
@@ -497,14 +505,103 @@ mod tests {
         run.parameters.report = params.clone();
         write_json(&folder.path().join(RUN), &run).unwrap();
         write_logo(folder.path(), &folder.path().join(RUN), "image/png").unwrap();
+        folder
+    }
+
+    /// The report of them.
+    fn settled(moving: &[u32], params: &ReportParams) -> String {
+        let folder = settled_results(moving, params);
         let html = std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap();
         check_nesting(&html);
         html
     }
 
+    /// A language that no file holds: the English texts, each between marks.
+    fn marked() -> &'static Texts {
+        fn mark(value: &mut Value) {
+            match value {
+                Value::String(text) => *text = format!("\u{27e6}{text}\u{27e7}"),
+                Value::Array(list) => list.iter_mut().for_each(mark),
+                Value::Object(table) => table.values_mut().for_each(mark),
+                _ => {}
+            }
+        }
+        let mut report: Value = Language::English.read("report");
+        mark(&mut report);
+        let mut texts = Texts::deserialize(&*Box::leak(Box::new(report))).unwrap();
+        texts.decimal = ".";
+        Box::leak(Box::new(texts))
+    }
+
+    /// The words of a page that stand outside the marks, without names and keys of files.
+    fn unmarked(html: &str) -> BTreeSet<String> {
+        let body = html.split("<body>").nth(1).unwrap();
+        let body = body.split("<section id=\"audit\">").next().unwrap();
+        let body = body.split("<script").next().unwrap();
+        let after_code = |part: &str| {
+            part.split_once("</code>")
+                .map_or(part.to_owned(), |p| p.1.to_owned())
+        };
+        let body: String = body.split("<code>").map(after_code).collect();
+        let (mut outside, mut depth, mut is_tag) = (String::new(), 0, false);
+        for c in body.chars() {
+            match c {
+                '<' => is_tag = true,
+                '>' => is_tag = false,
+                _ if is_tag => {}
+                '\u{27e6}' => depth += 1,
+                '\u{27e7}' => depth -= 1,
+                _ if depth == 0 => outside.push(c),
+                _ => continue,
+            }
+            if is_tag || c == '>' {
+                outside.push(' ');
+            }
+        }
+        let words = outside.split(|c: char| !c.is_alphabetic());
+        let is_name = |word: &&str| word.len() < 3 || ["Wall", "stonewise", "UTC"].contains(word);
+        words.filter(|word| !is_name(word)).map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn a_new_language_needs_nothing_but_its_texts() {
+        let texts = marked();
+        let sound = settled_results(&[8, 15], &ReportParams::default());
+        let doubtful = folder(&rows());
+        write_json(&doubtful.path().join(RUN), &run_record("Wall", &["A", "B"])).unwrap();
+        let course = series(Language::English);
+        let trends = std::fs::read(course.path().join(TRENDS)).unwrap();
+        let trends: TrendsRecord = serde_json::from_slice(&trends).unwrap();
+        let verdict = Verdict::new(&Thresholds::default(), Vec::new());
+        let verdict = verdict.with_series(Some(crate::verdict::answers(&trends, texts)));
+        write_json(&course.path().join(VERDICT), &verdict).unwrap();
+
+        for (folder, converged) in [(&sound, true), (&doubtful, false), (&course, true)] {
+            let mut registration = registration_record();
+            if let EstimatorRecord::Adjustment(adjustment) = &mut registration.estimator {
+                adjustment.converged = converged;
+            }
+            // What a run wrote in the language of its project.
+            for check in &mut registration.checks {
+                for text in [&mut check.what, &mut check.source] {
+                    *text = format!("\u{27e6}{text}\u{27e7}");
+                }
+            }
+            write_json(&folder.path().join("data/registration.json"), &registration).unwrap();
+            let results = ResultSet::read(folder.path()).unwrap();
+            let results = ResultSet::read_pair(folder.path(), results.pairs).unwrap();
+            let facts = Summary::in_texts(&results, texts);
+            let pages = [Some(page(&results, &facts).unwrap()), yearly(&results, &facts)];
+            for html in pages.into_iter().flatten() {
+                let words = unmarked(&html);
+                assert!(html.contains('\u{27e6}') && words.is_empty(), "{words:?}");
+            }
+        }
+    }
+
     #[test]
     fn a_still_wall_is_fine_and_the_page_never_says_that_a_stone_moved() {
-        let html = settled(&[], &stonewise_base::report_params::ReportParams::default());
+        let html = settled(&[], &ReportParams::default());
         assert!(
             html.contains("<div class=\"verdict fine\"")
                 && html.contains("Fine: no motion is shown; detection limit: 1.4\u{a0}mm (median)")
@@ -523,7 +620,7 @@ mod tests {
 
     #[test]
     fn the_first_page_names_who_measured_and_what_to_look_at_in_both_languages() {
-        let params = stonewise_base::report_params::ReportParams {
+        let params = ReportParams {
             operator: Some("River <Authority>".to_owned()),
             instruments: Some("Scanner X".to_owned()),
             reference_number: Some("T-17".to_owned()),
@@ -548,7 +645,7 @@ mod tests {
         ] {
             assert!(html.contains(words), "{words}");
         }
-        let german = stonewise_base::report_params::ReportParams {
+        let german = ReportParams {
             language: Language::German,
             ..params
         };
@@ -582,11 +679,11 @@ mod tests {
 
     #[test]
     fn a_german_report_has_no_english_heading() {
-        let german = stonewise_base::report_params::ReportParams {
+        let german = ReportParams {
             language: Language::German,
-            ..stonewise_base::report_params::ReportParams::default()
+            ..ReportParams::default()
         };
-        let languages = [stonewise_base::report_params::ReportParams::default(), german];
+        let languages = [ReportParams::default(), german];
         let in_doubt = languages.each_ref().map(|params| {
             let mut run = run_record("Wall", &["A", "B"]);
             run.parameters.report = params.clone();

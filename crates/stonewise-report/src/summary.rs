@@ -1,7 +1,7 @@
 //! The facts that the report states in words.
 
 use crate::texts::Texts;
-use crate::verdict::{Course, Pair, is_doubted, verdict_on};
+use crate::verdict::{Course, Pair, is_doubted, verdict_in};
 use nalgebra::Point2;
 use std::collections::BTreeMap;
 use stonewise_base::report_params::{Language, ReportParams};
@@ -13,6 +13,8 @@ pub(crate) const FALSE_ALARMS: f64 = 0.05;
 
 /// Counts and order statistics of one run.
 pub(crate) struct Summary<'a> {
+    /// The texts in the language of the report.
+    pub texts: &'static Texts,
     pub stones: usize,
     /// Stones of each status that occurs, in the order of [`Status::ALL`].
     pub by_status: Vec<(Status, Vec<&'a StoneRow>)>,
@@ -42,9 +44,16 @@ pub(crate) struct Summary<'a> {
 }
 
 impl<'a> Summary<'a> {
+    /// The facts of these results, said in the language of their project.
     pub(crate) fn new(results: &'a ResultSet) -> Self {
+        let run = results.run.as_ref();
+        let language = run.map_or(Language::default(), |r| r.parameters.report.language);
+        Self::in_texts(results, Texts::of(language))
+    }
+
+    pub(crate) fn in_texts(results: &'a ResultSet, texts: &'static Texts) -> Self {
         let measured = results.measured();
-        let verdict = verdict(results);
+        let verdict = verdict(results, texts);
         let judged: BTreeMap<u32, &StoneVerdict> = verdict.stones.iter().map(|s| (s.stone_id, s)).collect();
         let has_moved = |s: &StoneRow| judged.get(&s.stone_id).is_some_and(|j| j.moved);
 
@@ -90,12 +99,8 @@ impl<'a> Summary<'a> {
             moved,
             measured,
             verdict,
+            texts,
         }
-    }
-
-    /// The texts in the language of the report.
-    pub(crate) fn texts(&self) -> &'static Texts {
-        Texts::of(self.cover.language)
     }
 
     /// Number of stones without a motion.
@@ -123,7 +128,7 @@ fn strongest(results: &ResultSet, moved: &[(&StoneRow, &RowMotion)]) -> Option<(
 }
 
 /// The verdict on the pair: from verdict.json; made from the tables where an earlier version wrote none.
-fn verdict(results: &ResultSet) -> EpochVerdict {
+fn verdict(results: &ResultSet, texts: &'static Texts) -> EpochVerdict {
     let written = results.verdict.as_ref();
     if let Some(verdict) = written.and_then(|v| v.epochs.get(results.pair - 1)) {
         return verdict.clone();
@@ -145,8 +150,7 @@ fn verdict(results: &ResultSet) -> EpochVerdict {
         course: &course,
     };
     let thresholds = run.map(|r| r.parameters.thresholds.clone()).unwrap_or_default();
-    let language = run.map_or(Language::default(), |r| r.parameters.report.language);
-    verdict_on(results, &pair, &thresholds, language)
+    verdict_in(results, &pair, &thresholds, texts)
 }
 
 fn region(results: &ResultSet, moved: &[(&StoneRow, &RowMotion)]) -> Option<[Point2<f64>; 2]> {

@@ -1,29 +1,35 @@
-//! A sentence with words left open, in both languages.
+//! A sentence with words left open, in every language.
 
 use super::Said;
 use super::braces::fill;
+use crate::report_params::Language;
 
-/// A sentence in both languages; words in braces are filled in.
+/// A sentence, or words of one, that the files of texts hold under `messages`; words in braces are filled in.
 #[derive(Debug)]
 pub struct Message {
     /// Name under which `docs/src/messages.md` explains it; absent for words that are part of a sentence.
     pub code: Option<&'static str>,
-    /// The text in English, as a run prints it.
-    pub english: &'static str,
-    /// The text in German, as a German report prints it.
-    pub german: &'static str,
+    /// Its key, in capitals.
+    name: &'static str,
 }
 
 impl Message {
+    pub(super) const fn new(name: &'static str, code: Option<&'static str>) -> Self {
+        Self { code, name }
+    }
+
     /// The sentence with these values: names and counts as they are ([`Said::from`]), numbers with decimals
     /// ([`Said::numbers`]), other messages.
     pub fn say(&self, values: &[(&str, Said)]) -> Said {
-        let english: Vec<(&str, &str)> = values.iter().map(|(name, v)| (*name, &*v.english)).collect();
-        let german: Vec<(&str, &str)> = values.iter().map(|(name, v)| (*name, v.in_german())).collect();
+        let key = format!("messages.{}", self.name.to_ascii_lowercase());
+        let in_language = |language: Language| {
+            let values: Vec<(&str, &str)> =
+                values.iter().map(|(name, v)| (*name, v.text(language))).collect();
+            fill(language.text(&key), &values)
+        };
         Said {
             code: self.code.map(str::to_owned),
-            english: fill(self.english, &english),
-            german: Some(fill(self.german, &german)),
+            ..Said::in_each(in_language)
         }
     }
 }
@@ -34,17 +40,12 @@ impl From<&Message> for Said {
     }
 }
 
-/// Declares messages and, for tests, the list of all of them: a name, the code if it is a sentence of its own, the
-/// English and the German text of each.
+/// Declares messages, each with its code if it is a sentence of its own, and, for tests, the list of all of them.
 macro_rules! messages {
-    ($all:ident { $($name:ident $(= $code:literal)?: $english:expr, $german:expr;)* }) => {
+    ($all:ident { $($name:ident $(= $code:literal)?,)* }) => {
         $(
-            #[doc = $english]
-            pub static $name: Message = Message {
-                code: messages!(@code $($code)?),
-                english: $english,
-                german: $german,
-            };
+            /// The message of this name in the files of texts.
+            pub static $name: Message = Message::new(stringify!($name), messages!(@code $($code)?));
         )*
 
         #[cfg(test)]
@@ -58,26 +59,28 @@ pub(super) use messages;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::{doubts::DOUBTS, findings::FINDINGS, notices::NOTICES};
-    use std::collections::BTreeSet;
+    use crate::messages::findings::{DEGREES, FEET, FINDINGS, SYSTEM_UNIT, TOO_SMALL};
+    use crate::messages::notices::{AREA_OFF_WALL, NOTICES, STABLE_MOVED};
+    use crate::messages::{doubts::DOUBTS, remarks::REMARKS};
+    use std::collections::{BTreeMap, BTreeSet};
 
-    fn braces(text: &str) -> BTreeSet<&str> {
-        text.split('{')
-            .skip(1)
-            .filter_map(|t| Some(t.split_once('}')?.0))
-            .collect()
+    /// A key without a message would never be said, a message without a key would say nothing.
+    #[test]
+    fn the_files_hold_the_messages_and_nothing_else() {
+        let keys: BTreeMap<String, String> = Language::English.read("messages");
+        let all = [DOUBTS, FINDINGS, NOTICES, REMARKS].concat();
+        let names: BTreeSet<String> = all.iter().map(|m| m.name.to_ascii_lowercase()).collect();
+        assert_eq!(names.len(), all.len());
+        assert_eq!(names, keys.into_keys().collect());
     }
 
     #[test]
-    fn both_languages_leave_the_same_words_open_and_differ() {
-        for message in [DOUBTS, FINDINGS, NOTICES].concat() {
-            assert_eq!(
-                braces(message.english),
-                braces(message.german),
-                "{}",
-                message.english
-            );
-            assert_ne!(message.english, message.german);
+    fn languages_differ() {
+        for message in [DOUBTS, FINDINGS, NOTICES, REMARKS].concat() {
+            let said = Said::from(message);
+            for (language, text) in &said.translations {
+                assert_ne!(*text, said.english, "{} in {}", message.name, language.tag());
+            }
         }
     }
 
@@ -99,30 +102,33 @@ mod tests {
 
     #[test]
     fn numbers_and_sentences_are_those_of_the_language() {
-        let message = Message {
-            code: None,
-            english: "{share} % of {file} are in {unit} at ({place})",
-            german: "{share} % von {file} sind in {unit} bei ({place})",
-        };
-        let feet = Message {
-            code: None,
-            english: "feet",
-            german: "Fuß",
-        };
-        let said = message.say(&[
-            ("share", Said::numbers("2.5".to_owned())),
-            ("file", "a.laz".into()),
-            ("unit", Said::from(&feet)),
-            ("place", Said::list(&["1.0".to_owned(), "-2.0".to_owned()])),
-        ]);
-        assert_eq!(said.english, "2.5 % of a.laz are in feet at (1.0, -2.0)");
-        let german = "2,5 % von a.laz sind in Fuß bei (1,0; -2,0)";
-        assert_eq!(said.german.as_deref(), Some(german));
-        let units = Said::from("units");
-        assert_eq!(Said::about(&units, &said).german, None);
+        let place = Said::list(&["1.0".to_owned(), "-2.0".to_owned()]);
+        let area = AREA_OFF_WALL.say(&[("place", place)]);
+        let said = STABLE_MOVED.say(&[("area", area)]);
         assert_eq!(
-            Said::about(&Said::from(&feet), &said).german,
-            Some(format!("Fuß: {german}"))
+            said.english,
+            "the area off the wall around (1.0, -2.0) moved against the other stable areas and is left out"
         );
+        assert_eq!(
+            said.text(Language::German),
+            "die Fläche neben der Mauer um (1,0; -2,0) hat sich gegen die anderen stabilen Flächen bewegt und ist weggelassen"
+        );
+        let size = ["x", "y", "z"].map(|axis| (axis, Said::numbers("2.5".to_owned())));
+        let small = TOO_SMALL.say(&[&size[..], &[("points", "7".into())]].concat());
+        assert!(
+            small
+                .text(Language::German)
+                .starts_with("2,5 x 2,5 x 2,5 m, 7 Punkte")
+        );
+
+        // Names have no translation, and half of one would be worse than none.
+        let unit = SYSTEM_UNIT.say(&[("unit", (&FEET).into())]);
+        assert_eq!(Said::about(&Said::from("units"), &unit).translations.len(), 0);
+        let both = Said::about(&Said::from(&DEGREES), &unit);
+        assert!(
+            both.text(Language::German)
+                .starts_with("Grad: das Koordinatensystem")
+        );
+        assert_eq!(both.code, unit.code);
     }
 }

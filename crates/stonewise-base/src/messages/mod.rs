@@ -14,4 +14,4 @@ pub use doubts::{
     NOT_CONVERGED, PART_REFUSED, SIDE_UNSURE, STRETCHED, TORN, TURNED, UNCOVERED,
 };
 pub use message::Message;
-pub use said::Said;
+pub use said::{Said, Translations, recorded};

@@ -2,7 +2,11 @@
 
 use crate::report_params::Language;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fmt;
+
+/// A text in other languages than English.
+pub type Translations = BTreeMap<Language, String>;
 
 /// A sentence, or a value of one, that a run says in English and a report in its own language.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -12,60 +16,75 @@ pub struct Said {
     pub code: Option<String>,
     /// The text in English, as a run prints it.
     pub english: String,
-    /// The text in German, as a German report prints it; absent where there are no German words.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub german: Option<String>,
+    /// The text in other languages, as reports print it; empty where there are no words but English ones.
+    #[serde(default, skip_serializing_if = "Translations::is_empty")]
+    pub translations: Translations,
 }
 
 impl Said {
-    /// Numbers, written with a point before their decimals, which is a comma in German.
-    pub fn numbers(english: String) -> Self {
+    /// A text that every language has.
+    pub fn in_each(text: impl Fn(Language) -> String) -> Self {
+        let others = Language::ALL.into_iter().filter(|l| *l != Language::English);
         Self {
             code: None,
-            german: Some(english.replace('.', ",")),
-            english,
+            english: text(Language::English),
+            translations: others.map(|language| (language, text(language))).collect(),
         }
     }
 
-    /// Numbers one after the other: German, whose numbers hold commas, has semicolons between them.
+    /// Numbers, given with a point before their decimals.
+    pub fn numbers(numbers: String) -> Self {
+        Self::in_each(|language| numbers.replace('.', language.text("language.decimal")))
+    }
+
+    /// Numbers one after the other, given likewise.
     pub fn list(numbers: &[String]) -> Self {
-        Self {
-            code: None,
-            english: numbers.join(", "),
-            german: Some(numbers.join("; ").replace('.', ",")),
-        }
+        Self::in_each(|language| {
+            let numbers = numbers
+                .iter()
+                .map(|n| n.replace('.', language.text("language.decimal")));
+            numbers.collect::<Vec<_>>().join(language.text("language.list"))
+        })
     }
 
-    /// The text of a report in German; in English where there are no German words.
-    pub fn in_german(&self) -> &str {
-        self.german.as_deref().unwrap_or(&self.english)
+    /// The text in a language; in English where it has no words in this one.
+    pub fn text(&self, language: Language) -> &str {
+        self.translations.get(&language).unwrap_or(&self.english)
     }
 
-    /// The German sentence, where a report is in German.
-    pub fn german_in(german: Option<String>, language: Language) -> Option<String> {
-        german.filter(|_| language == Language::German)
-    }
-
-    /// The sentence, and another behind it, in English and in German.
+    /// The sentence, and another behind it.
     #[must_use]
-    pub fn and(self, [english, german]: [&str; 2]) -> Self {
-        Self {
-            code: self.code,
-            english: format!("{}. {english}", self.english),
-            german: self.german.map(|said| format!("{said}. {german}")),
+    pub fn and(mut self, other: impl Fn(Language) -> &'static str) -> Self {
+        let add = |text: &mut String, language| *text += &format!(". {}", other(language));
+        add(&mut self.english, Language::English);
+        for (language, text) in &mut self.translations {
+            add(text, *language);
         }
+        self
     }
 
-    /// What was looked at, and what was seen, with a colon between them; in German where both are.
+    /// What was looked at, and what was seen, with a colon between them; translated where both are.
     pub fn about(topic: &Self, text: &Self) -> Self {
-        let german = topic.german.as_ref().zip(text.german.as_ref());
+        // Half a translation would be worse than none.
+        let both = |(language, topic): (&Language, &String)| {
+            let colon = language.text("language.colon");
+            Some((
+                *language,
+                format!("{topic}{colon}{}", text.translations.get(language)?),
+            ))
+        };
         Self {
             code: text.code.clone(),
             english: format!("{}: {}", topic.english, text.english),
-            // Half a translation would be worse than none.
-            german: german.map(|(topic, text)| format!("{topic}: {text}")),
+            translations: topic.translations.iter().filter_map(both).collect(),
         }
     }
+}
+
+/// What a record keeps of translations whose report is in this language.
+pub fn recorded(mut translations: Translations, language: Language) -> Translations {
+    translations.retain(|of, _| *of == language);
+    translations
 }
 
 impl fmt::Display for Said {
@@ -79,7 +98,7 @@ impl From<String> for Said {
         Self {
             code: None,
             english,
-            german: None,
+            translations: Translations::new(),
         }
     }
 }

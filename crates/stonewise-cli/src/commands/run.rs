@@ -125,71 +125,34 @@ fn unfinished(out: &Path) -> String {
 
 /// Prints the notes on how the project file was read.
 pub fn tell_of_project(project: &Project, printer: &Printer) {
-    let words = Words::of(project);
+    let language = project.settings.report.language;
     for note in &project.notes {
-        let text = match words.language {
-            Language::English => note.english.as_str(),
-            Language::German => note.in_german(),
-        };
-        printer.remark(words.note, text, note.code.as_deref());
+        printer.remark(word("note", language), note.text(language), note.code.as_deref());
     }
 }
 
-/// What the command says around the results, in the language of the project.
-struct Words {
-    language: Language,
-    doubt: &'static str,
-    skipped: &'static str,
-    note: &'static str,
-    /// What is counted of the stones: all, matched, measured, moved, loose.
-    counted: [&'static str; 5],
-    cannot_tell: &'static str,
-}
-
-static ENGLISH: Words = Words {
-    language: Language::English,
-    doubt: "DOUBT",
-    skipped: "skipped",
-    note: "note",
-    counted: ["stones", "matched", "measured", "moved", "loose"],
-    cannot_tell: "which of them moved or are loose cannot be told",
-};
-
-static GERMAN: Words = Words {
-    language: Language::German,
-    doubt: "ZWEIFEL",
-    skipped: "ausgelassen",
-    note: "Hinweis",
-    counted: ["Steine", "zugeordnet", "gemessen", "bewegt", "lose"],
-    cannot_tell: "welche davon sich bewegt haben oder lose sind, ist nicht zu sagen",
-};
-
-impl Words {
-    fn of(project: &Project) -> &'static Self {
-        match project.settings.report.language {
-            Language::English => &ENGLISH,
-            Language::German => &GERMAN,
-        }
-    }
+/// A word that the command says around the results.
+fn word(key: &str, language: Language) -> &'static str {
+    language.text(&format!("terminal.{key}"))
 }
 
 /// Prints in a few lines what came out, without the notes on the project file. Doubts come first, also with `--quiet`.
 pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
-    let words = Words::of(project);
+    let language = project.settings.report.language;
     for doubt in summary.doubts() {
-        printer.always(&format!("{}: {}", words.doubt, doubt.line(words.language)));
+        printer.always(&format!("{}: {}", word("doubt", language), doubt.line(language)));
     }
     for warning in summary
         .warnings
         .iter()
         .filter(|w| !w.doubt && w.step != PROJECT_STEP)
     {
-        let word = if warning.skipped_input {
-            words.skipped
-        } else {
-            words.note
-        };
-        printer.remark(word, &warning.text(words.language), warning.code.as_deref());
+        let key = if warning.skipped_input { "skipped" } else { "note" };
+        printer.remark(
+            word(key, language),
+            &warning.text(language),
+            warning.code.as_deref(),
+        );
     }
     for (epoch, pair) in project.epochs.iter().skip(1).zip(&summary.pairs) {
         if pair.rows.is_empty() {
@@ -197,7 +160,11 @@ pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
         }
         let verdicts = summary.verdict.iter().flat_map(|v| &v.epochs);
         let verdict = verdicts.into_iter().find(|v| v.epoch == epoch.name);
-        printer.log(&format!("{}: {}", epoch.name, counts(&pair.rows, verdict, words)));
+        printer.log(&format!(
+            "{}: {}",
+            epoch.name,
+            counts(&pair.rows, verdict, language)
+        ));
         // The sentence on a single later epoch is the last line.
         if let Some(verdict) = verdict.filter(|_| summary.pairs.len() > 1) {
             printer.log(&format!("{}: {}", epoch.name, verdict.sentence));
@@ -205,24 +172,21 @@ pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
     }
 }
 
-fn counts(rows: &[StoneRow], verdict: Option<&EpochVerdict>, words: &Words) -> String {
+fn counts(rows: &[StoneRow], verdict: Option<&EpochVerdict>, language: Language) -> String {
     let count = |is: fn(&StoneRow) -> bool| rows.iter().filter(|row| is(row)).count();
     let numbers = [
-        rows.len(),
-        count(|r| r.matched_id.is_some()),
-        count(|r| r.status == Status::Ok),
-        verdict.map_or(0, |v| v.wall.moved),
-        count(|r| r.motion.as_ref().is_some_and(|m| m.loose)),
+        ("stones", rows.len()),
+        ("matched", count(|r| r.matched_id.is_some())),
+        ("measured", count(|r| r.status == Status::Ok)),
+        ("moved", verdict.map_or(0, |v| v.wall.moved)),
+        ("loose", count(|r| r.motion.as_ref().is_some_and(|m| m.loose))),
     ];
-    let mut said: Vec<String> = words
-        .counted
-        .iter()
-        .zip(numbers)
-        .map(|(word, n)| format!("{word} {n}"))
-        .collect();
+    let mut said = numbers
+        .map(|(key, n)| format!("{} {n}", word(key, language)))
+        .to_vec();
     if verdict.is_some_and(|v| !v.is_sound()) {
         said.truncate(3);
-        said.push(words.cannot_tell.to_owned());
+        said.push(word("cannot_tell", language).to_owned());
     }
     said.join(", ")
 }

@@ -3,7 +3,7 @@
 use crate::Project;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
-use stonewise_base::messages::Said;
+use stonewise_base::messages::{Said, Translations};
 
 /// What a finding means for a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -48,21 +48,22 @@ pub struct Finding {
     pub code: Option<String>,
     /// What was seen, and what to do about it.
     pub text: String,
-    /// Topic and text in German, where there are German words.
-    german: Option<String>,
+    /// Topic and text in other languages, where these have words for both.
+    #[serde(default, skip_serializing_if = "Translations::is_empty")]
+    translations: Translations,
 }
 
 impl Finding {
     pub(super) fn new(epoch: &str, topic: impl Into<Said>, verdict: Verdict, text: impl Into<Said>) -> Self {
         let (topic, text) = (topic.into(), text.into());
-        let german = Said::about(&topic, &text).german;
+        let translations = Said::about(&topic, &text).translations;
         Self {
             epoch: epoch.to_owned(),
             topic: topic.english,
             verdict,
             code: text.code,
             text: text.english,
-            german,
+            translations,
         }
     }
 
@@ -71,7 +72,7 @@ impl Finding {
         Said {
             code: self.code.clone(),
             english: format!("{}: {}", self.topic, self.text),
-            german: self.german.clone(),
+            translations: self.translations.clone(),
         }
     }
 }

@@ -181,7 +181,7 @@ fn warnings(warnings: &[Warning], texts: &Texts) -> String {
         vec![
             escape(&w.step),
             escape(&w.subject),
-            said(&w.message, w.german.as_deref(), texts),
+            said(&w.message, &w.translations, texts),
             match w.skipped_input {
                 true => format!("<b>{}</b>", names.left_out),
                 false => String::new(),

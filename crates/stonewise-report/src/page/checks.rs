@@ -40,7 +40,10 @@ fn row(check: &CheckRecord, texts: &Texts) -> Vec<String> {
         false => names.at_most,
     };
     let outcome = match &check.remedy {
-        Some(remedy) => format!("<b>{}</b>: {}", names.failed, with_code(remedy)),
+        Some(remedy) => {
+            let colon = texts.language.text("language.colon");
+            format!("<b>{}</b>{colon}{}", names.failed, with_code(remedy))
+        }
         None => names.passed.to_owned(),
     };
     vec![

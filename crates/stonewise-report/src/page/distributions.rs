@@ -23,7 +23,7 @@ pub(super) fn distributions(
     compared: &Comparison,
     truth_mm: Option<[f64; 2]>,
 ) -> String {
-    let texts = facts.texts();
+    let texts = facts.texts;
     let names = &texts.charts;
     let mut grid = String::new();
 
@@ -141,7 +141,7 @@ fn shared_limits(series: &[&[[f64; 2]]]) -> [[f64; 2]; 2] {
 
 /// What all stones have in common, and what stands still; the latter is unknown where a run is in doubt.
 pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
-    let texts = facts.texts();
+    let texts = facts.texts;
     let names = &texts.charts;
     let is_sound = facts.verdict.is_sound();
     let columns = if is_sound { 4 } else { 2 };
@@ -198,7 +198,7 @@ fn registration(results: &ResultSet, texts: &Texts) -> String {
             )
         };
         let values = [
-            ("note", &*said(&datum.note, datum.german.as_deref(), texts)),
+            ("note", &*said(&datum.note, &datum.translations, texts)),
             ("parts", &*axes.map(part).collect::<Vec<_>>().join(", ")),
             ("cells", &*count(observers.stable_cells)),
             ("compared", &*observers.compared_stones.map(count).join(names.and)),
@@ -208,7 +208,7 @@ fn registration(results: &ResultSet, texts: &Texts) -> String {
     match results.datum() {
         Some(datum) if datum.state != DatumState::Unknown => fill(
             names.known,
-            &[("note", &*said(&datum.note, datum.german.as_deref(), texts))],
+            &[("note", &*said(&datum.note, &datum.translations, texts))],
         ),
         _ => names.unknown.to_owned(),
     }

@@ -22,7 +22,8 @@ pub(super) fn head(title: &str, texts: &Texts, scripts: &str, style: &str) -> St
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
          <meta name=\"color-scheme\" content=\"light dark\"><title>{title}: {}</title>\n\
          <style>\n{PAGE_STYLE}{style}</style></head>\n",
-        texts.tag, texts.sections.title_end
+        texts.language.tag(),
+        texts.sections.title_end
     )
 }
 

@@ -17,8 +17,9 @@ pub(super) fn doubts(warnings: &[Warning], texts: &Texts) -> String {
         texts.page.doubts
     );
     for warning in all {
-        let message = said(&warning.message, warning.german.as_deref(), texts);
-        let _ = write!(out, "<li>{}: {message}</li>", escape(&warning.subject));
+        let message = said(&warning.message, &warning.translations, texts);
+        let colon = texts.language.text("language.colon");
+        let _ = write!(out, "<li>{}{colon}{message}</li>", escape(&warning.subject));
     }
     out.push_str("</ul></div>");
     out

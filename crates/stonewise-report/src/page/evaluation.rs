@@ -82,11 +82,9 @@ fn rmse_table(methods: &[(&str, &MotionScore)], texts: &Texts) -> String {
         .map(|(name, score)| row(name, score, |s| s.rmse_m))
         .collect();
     rows.extend(methods.first().map(|(name, score)| {
-        // German nouns keep their capitals.
-        let name = if texts.tag == "de" {
-            (*name).to_owned()
-        } else {
-            name.to_lowercase()
+        let name = match texts.language.read("language.capital_nouns") {
+            true => (*name).to_owned(),
+            false => name.to_lowercase(),
         };
         let title = fill(names.zero, &[("method", &*name)]);
         row(&title, score, |s| s.zero_predictor_rmse_m)

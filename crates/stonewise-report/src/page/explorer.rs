@@ -80,7 +80,7 @@ fn document(results: &ResultSet, facts: &Summary, joints: &[Joint], blocks: Map<
         .run
         .as_ref()
         .and_then(|run| epoch_names(run, results.pair));
-    let texts = facts.texts();
+    let texts = facts.texts;
     let [diverging, sequential] = colours();
     json!({
         "epochs": names.unwrap_or_else(|| {

@@ -9,6 +9,7 @@ use crate::summary::Summary;
 use crate::texts::{Texts, counted, fill};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use stonewise_base::messages::Translations;
 use stonewise_base::report_params::Language;
 use stonewise_figure::{count, escape};
 use stonewise_results::records::{Datum, DatumState, EpochRecord, Remark, State};
@@ -48,7 +49,7 @@ pub(super) fn verdict(facts: &Summary) -> String {
 
 /// What to do after the verdict, and why there is one without thresholds.
 pub(super) fn next(results: &ResultSet, facts: &Summary) -> String {
-    let page = &facts.texts().page;
+    let page = &facts.texts.page;
     let [fine, look, mend] = page.next;
     let next = match facts.verdict.state {
         State::Fine => fine,
@@ -62,7 +63,7 @@ pub(super) fn next(results: &ResultSet, facts: &Summary) -> String {
 
 /// Who measured, with what, and the number of the report.
 pub(super) fn letter(facts: &Summary) -> String {
-    let page = &facts.texts().page;
+    let page = &facts.texts.page;
     let given = [
         (page.reference_number, &facts.cover.reference_number),
         (page.operator, &facts.cover.operator),
@@ -85,7 +86,7 @@ pub(super) fn letter(facts: &Summary) -> String {
 
 /// Who measured, and the epochs with their dates and conditions.
 pub(super) fn cover(results: &ResultSet, facts: &Summary) -> String {
-    let page = &facts.texts().page;
+    let page = &facts.texts.page;
     let mut out = letter(facts);
     if let Some(run) = &results.run {
         let dash = || "\u{2013}".to_owned();
@@ -98,7 +99,7 @@ pub(super) fn cover(results: &ResultSet, facts: &Summary) -> String {
             vec![
                 format!("<b>{}</b>{note}", escape(&epoch.name)),
                 epoch.date.as_deref().map_or_else(dash, escape),
-                conditions(epoch, facts.texts()).unwrap_or_else(dash),
+                conditions(epoch, facts.texts).unwrap_or_else(dash),
             ]
         };
         let chosen = [0, results.pair];
@@ -136,7 +137,7 @@ pub(super) fn conditions(epoch: &EpochRecord, texts: &Texts) -> Option<String> {
 
 /// What to look at first, what was not measured, the zones, the map, the place to sign.
 pub(super) fn body(results: &ResultSet, facts: &Summary) -> String {
-    let page = &facts.texts().page;
+    let page = &facts.texts.page;
     let map = if facts.measured.is_empty() {
         String::new()
     } else {
@@ -153,7 +154,7 @@ pub(super) fn body(results: &ResultSet, facts: &Summary) -> String {
         not_measured(facts),
         before_and_after(results, facts),
         zones(facts),
-        signature(results, facts.texts())
+        signature(results, facts.texts)
     )
 }
 
@@ -198,7 +199,7 @@ fn sign_block(texts: &Texts, [who, place, mark]: [String; 3]) -> String {
 
 /// What people remarked on this pair of epochs; empty where nobody did.
 pub(super) fn remarks(results: &ResultSet, facts: &Summary) -> String {
-    let page = &facts.texts().page;
+    let page = &facts.texts.page;
     let epochs = results.run.as_ref().map(|run| &run.epochs);
     let epoch = epochs.and_then(|epochs| epochs.get(results.pair));
     let is_here =
@@ -225,7 +226,7 @@ pub(super) fn remarks(results: &ResultSet, facts: &Summary) -> String {
 
 /// The detection limit in plain words.
 fn limit(facts: &Summary) -> String {
-    let texts = facts.texts();
+    let texts = facts.texts;
     if !facts.verdict.is_sound() {
         return format!("<b>{}</b>", texts.page.limit_unknown);
     }
@@ -246,7 +247,7 @@ fn limit(facts: &Summary) -> String {
 
 /// How many stones have no motion, and why.
 fn not_measured(facts: &Summary) -> String {
-    let texts = facts.texts();
+    let texts = facts.texts;
     if facts.not_measured() == 0 {
         return format!("<p>{}</p>", texts.page.all_measured);
     }
@@ -274,7 +275,7 @@ fn not_measured(facts: &Summary) -> String {
 
 /// The states of the zones; empty without zones.
 fn zones(facts: &Summary) -> String {
-    let (texts, page) = (facts.texts(), &facts.texts().page);
+    let (texts, page) = (facts.texts, &facts.texts.page);
     if facts.verdict.zones.is_empty() {
         return String::new();
     }
@@ -309,7 +310,7 @@ fn zones(facts: &Summary) -> String {
 
 /// What is known about the registration of the epochs; a run in doubt has no limits that could hold it.
 pub(super) fn registration(datum: Option<&Datum>, facts: &Summary) -> String {
-    let (texts, page) = (facts.texts(), &facts.texts().page);
+    let (texts, page) = (facts.texts, &facts.texts.page);
     let is_sound = facts.verdict.is_sound();
     match datum {
         Some(datum) if datum.state != DatumState::Unknown => {
@@ -317,10 +318,7 @@ pub(super) fn registration(datum: Option<&Datum>, facts: &Summary) -> String {
                 true => page.registration_included,
                 false => page.registration_in_doubt,
             };
-            fill(
-                text,
-                &[("note", &*said(&datum.note, datum.german.as_deref(), texts))],
-            )
+            fill(text, &[("note", &*said(&datum.note, &datum.translations, texts))])
         }
         Some(_) if is_sound => page.registration_unknown.to_owned(),
         Some(_) => page.registration_unknown_in_doubt.to_owned(),
@@ -330,11 +328,11 @@ pub(super) fn registration(datum: Option<&Datum>, facts: &Summary) -> String {
 
 /// What a run said, as HTML in the language of the report, or marked as English; commands between backticks
 /// as code.
-pub(super) fn said(english: &str, german: Option<&str>, texts: &Texts) -> String {
-    match (texts.language(), german) {
-        (Language::English, _) => with_code(english),
-        (Language::German, Some(german)) => with_code(german),
-        (Language::German, None) => format!("<span lang=\"en\">{}</span>", with_code(english)),
+pub(super) fn said(english: &str, translations: &Translations, texts: &Texts) -> String {
+    match translations.get(&texts.language) {
+        Some(text) => with_code(text),
+        None if texts.language == Language::English => with_code(english),
+        None => format!("<span lang=\"en\">{}</span>", with_code(english)),
     }
 }
 

@@ -22,7 +22,7 @@ pub(super) fn instruments(results: &ResultSet, texts: &Texts) -> String {
 
 /// What the section says.
 pub(super) fn compared(results: &ResultSet, texts: &Texts) -> String {
-    let names = texts.instruments;
+    let names = &texts.instruments;
     let later = results
         .run
         .as_ref()
@@ -89,7 +89,7 @@ fn said(datum: DatumUse, names: &InstrumentTexts) -> &'static str {
 }
 
 fn left_out(found: &InstrumentsEpoch, texts: &Texts) -> Option<String> {
-    let names = texts.instruments;
+    let names = &texts.instruments;
     let why = |why: &WhyLeftOut| match why {
         WhyLeftOut::NoDate => names.no_date.to_owned(),
         WhyLeftOut::BeforeReadings => names.before.to_owned(),

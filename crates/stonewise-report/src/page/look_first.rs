@@ -30,7 +30,7 @@ struct Ranked<'a> {
 
 /// The zones of deformation, stones and joints that call for a closer look, the worst first; of a run in doubt none.
 pub(super) fn look_first(results: &ResultSet, facts: &Summary) -> String {
-    let texts = facts.texts();
+    let texts = facts.texts;
     if !facts.verdict.is_sound() {
         return format!("<p>{}</p>", texts.page.look_at_doubt);
     }
@@ -133,7 +133,7 @@ fn worst_first(a: &Ranked, b: &Ranked) -> Ordering {
 
 /// A stone, its place, and what is the matter with it.
 fn stone(verdict: &StoneVerdict, row: &StoneRow, facts: &Summary) -> String {
-    let (texts, page) = (facts.texts(), &facts.texts().page);
+    let (texts, page) = (facts.texts, &facts.texts.page);
     let place = [
         ("along", &*texts.number(row.along_m, 2)),
         ("up", &*texts.number(row.up_m, 2)),
@@ -167,13 +167,13 @@ fn joint(verdict: &JointVerdict, facts: &Summary) -> String {
     let [a, b] = verdict
         .stones
         .map(|id| format!("<a data-stone=\"{id}\">{id}</a>"));
-    let text = fill(facts.texts().page.opened_joint, &[("a", &*a), ("b", &*b)]);
+    let text = fill(facts.texts.page.opened_joint, &[("a", &*a), ("b", &*b)]);
     measured(&text, Some(verdict.opening_mm), Some(verdict.interval_mm), facts)
 }
 
 /// A zone of deformation, its place, and what it did.
 fn zone(verdict: &DeformedZone, facts: &Summary) -> String {
-    let (texts, page) = (facts.texts(), &facts.texts().page);
+    let (texts, page) = (facts.texts, &facts.texts.page);
     let place = [
         ("along", &*texts.number(verdict.along_m, 2)),
         ("up", &*texts.number(verdict.up_m, 2)),
@@ -189,7 +189,7 @@ fn zone(verdict: &DeformedZone, facts: &Summary) -> String {
 
 /// The text with a length and its interval, millimetres.
 fn measured(text: &str, length: Option<f64>, interval: Option<[f64; 2]>, facts: &Summary) -> String {
-    let mm = |millimetres: f64| facts.texts().mm(millimetres / 1e3);
+    let mm = |millimetres: f64| facts.texts.mm(millimetres / 1e3);
     let [low, high] = interval.unwrap_or([f64::NAN; 2]).map(mm);
     let length = mm(length.unwrap_or(f64::NAN));
     fill(text, &[("length", &*length), ("low", &*low), ("high", &*high)])

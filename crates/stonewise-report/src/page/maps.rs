@@ -28,7 +28,7 @@ fn legend(names: &MapTexts, is_sound: bool) -> String {
 
 /// All maps of a run; one diverging scale is shared by the components and M3C2.
 pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> String {
-    let texts = facts.texts();
+    let texts = facts.texts;
     let names = &texts.maps;
     let layout = MapLayout::new(results, texts);
     let shared = Scale::Diverging(facts.component_limit_m);
@@ -98,7 +98,7 @@ fn shape_map(layout: &MapLayout, facts: &Summary, numbers: Option<&[u32]>) -> St
     if lengths().next().is_none() {
         return String::new();
     }
-    let (names, is_sound) = (&facts.texts().maps, facts.verdict.is_sound());
+    let (names, is_sound) = (&facts.texts.maps, facts.verdict.is_sound());
     let picture = MapPicture {
         title: names.shape,
         value: &length,
@@ -124,7 +124,7 @@ pub(super) fn lead_map(results: &ResultSet, facts: &Summary) -> String {
     if facts.verdict.has_datum() {
         return motion_map(results, facts);
     }
-    let layout = MapLayout::new(results, facts.texts());
+    let layout = MapLayout::new(results, facts.texts);
     let class = if layout.is_wide() { "lead wide" } else { "lead" };
     match shape_map(&layout, facts, Some(&named(&facts.verdict))) {
         shape if shape.is_empty() => motion_map(results, facts),
@@ -134,7 +134,7 @@ pub(super) fn lead_map(results: &ResultSet, facts: &Summary) -> String {
 
 /// How joints open and close; empty where no joint has both its stones measured.
 fn opening_map(layout: &MapLayout, joints: &[Joint], facts: &Summary) -> String {
-    let names = &facts.texts().maps;
+    let names = &facts.texts.maps;
     let is_sound = facts.verdict.is_sound();
     let moved: Vec<_> = joints
         .iter()
@@ -158,10 +158,10 @@ fn opening_map(layout: &MapLayout, joints: &[Joint], facts: &Summary) -> String 
 
 /// How far the stones moved, for the summary: lengths and in-plane arrows.
 fn motion_map(results: &ResultSet, facts: &Summary) -> String {
-    let layout = MapLayout::new(results, facts.texts());
+    let layout = MapLayout::new(results, facts.texts);
     let norm = |s: &StoneRow| s.motion.as_ref().map(|m| m.displacement.norm());
     let norms = facts.measured.iter().map(|(_, m)| m.displacement.norm());
-    let page = &facts.texts().page;
+    let page = &facts.texts.page;
     let title = page.map_title;
     let is_sound = facts.verdict.is_sound();
     let end_m = nice_scale_m(norms);
@@ -188,10 +188,7 @@ fn motion_map(results: &ResultSet, facts: &Summary) -> String {
     } else {
         page.map_note_in_doubt
     };
-    let colours = fill(
-        page.map_colours,
-        &[("end", &*facts.texts().threshold(end_m * 1e3))],
-    );
+    let colours = fill(page.map_colours, &[("end", &*facts.texts.threshold(end_m * 1e3))]);
 
     let areas = match is_sound && facts.measured.iter().any(|(s, _)| s.zone_id > 0) {
         true => page.map_zones,
@@ -205,7 +202,7 @@ fn motion_map(results: &ResultSet, facts: &Summary) -> String {
 }
 
 fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
-    let texts = facts.texts();
+    let texts = facts.texts;
     let names = &texts.maps;
     let limit = |s: &StoneRow| s.motion.as_ref().map(|m| m.detection_limit_m);
     let relative = |s: &StoneRow| s.motion.as_ref().map(|m| m.relative.norm());

@@ -65,11 +65,10 @@ fn sections(texts: &Texts) -> [(&'static str, &'static str); 11] {
 ///
 /// # Errors
 /// None in practice: compressing in memory does not fail.
-pub(super) fn page(results: &ResultSet) -> Result<String, Error> {
-    let facts = Summary::new(results);
+pub(super) fn page(results: &ResultSet, facts: &Summary) -> Result<String, Error> {
     let (compared, joints) = (compare(results), joints(results));
-    let content = content(results, &facts, &compared, &joints, true);
-    let present = sections(facts.texts())
+    let content = content(results, facts, &compared, &joints, true);
+    let present = sections(facts.texts)
         .into_iter()
         .filter(|(id, _)| content.contains(&format!("<section id=\"{id}\">")));
     let links: String = present
@@ -78,19 +77,19 @@ pub(super) fn page(results: &ResultSet) -> Result<String, Error> {
     let data = if results.stones.is_empty() {
         String::new()
     } else {
-        explorer::data(results, &facts, &compared, &joints)?
+        explorer::data(results, facts, &compared, &joints)?
     };
 
     let body = format!(
         "<body>{PATTERNS}{}<nav>{links}</nav>\n<main>\n{content}</main>\n{data}",
-        header(results, &facts)
+        header(results, facts)
     );
 
     // Of all that the page holds, so that no input can guess it.
     let nonce = &blake3::hash(body.as_bytes()).to_hex()[..32];
     let head = head(
-        &title(results, facts.texts()),
-        facts.texts(),
+        &title(results, facts.texts),
+        facts.texts,
         &format!("script-src 'nonce-{nonce}'; "),
         &format!("{}{}", footer(results, ""), explorer::STYLE),
     );
@@ -108,7 +107,7 @@ pub(super) fn printed(all: &[&ResultSet], appendix: bool) -> String {
     for (results, number) in all.iter().zip(1..) {
         let facts = Summary::new(results);
         let (compared, joints) = (compare(results), joints(results));
-        texts = facts.texts();
+        texts = facts.texts;
         let content = content(results, &facts, &compared, &joints, appendix);
         // What is folded on the screen is open on paper.
         let content = content.replace("<details>", "<details open>");
@@ -152,21 +151,21 @@ fn content(
         body.push_str(&distributions::datum(results, facts));
     }
 
-    body.push_str(&instruments::instruments(results, facts.texts()));
-    body.push_str(&checks::checks(results, facts.texts()));
+    body.push_str(&instruments::instruments(results, facts.texts));
+    body.push_str(&checks::checks(results, facts.texts));
     if let Some(evaluation) = &results.evaluation {
-        body.push_str(&evaluation::evaluation(evaluation, facts.texts()));
+        body.push_str(&evaluation::evaluation(evaluation, facts.texts));
     }
-    body.push_str(&method::method(facts.texts()));
+    body.push_str(&method::method(facts.texts));
     if appendix {
-        body.push_str(&audit::audit(results, facts.texts()));
+        body.push_str(&audit::audit(results, facts.texts));
     }
     body
 }
 
 /// All that stands above the sections.
 fn header(results: &ResultSet, facts: &Summary) -> String {
-    let texts = facts.texts();
+    let texts = facts.texts;
     let warnings = results
         .run
         .as_ref()

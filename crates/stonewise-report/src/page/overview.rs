@@ -17,21 +17,17 @@ pub(super) fn summary(results: &ResultSet, facts: &Summary) -> String {
     let mut out = tiles(facts);
     out.push_str(&first_page::body(results, facts));
     out.push_str(&first_page::remarks(results, facts));
-    let _ = write!(
-        out,
-        "<h3 class=\"numbers\">{}</h3>",
-        facts.texts().page.in_numbers
-    );
+    let _ = write!(out, "<h3 class=\"numbers\">{}</h3>", facts.texts.page.in_numbers);
     out.push_str("<ul class=\"findings\">");
     for sentence in sentences(results, facts) {
         let _ = write!(out, "<li>{}</li>", with_units(&sentence));
     }
     out.push_str("</ul>");
-    section("summary", facts.texts().page.summary, &out)
+    section("summary", facts.texts.page.summary, &out)
 }
 
 fn tiles(facts: &Summary) -> String {
-    let (texts, page) = (facts.texts(), &facts.texts().page);
+    let (texts, page) = (facts.texts, &facts.texts.page);
     let tile =
         |value: String, what: &str| format!("<div class=\"tile\"><b>{value}</b><span>{what}</span></div>");
     let share = |n: usize| format!("{} <small>{}</small>", count(n), texts.percent(n, facts.stones));
@@ -72,13 +68,14 @@ fn tiles(facts: &Summary) -> String {
 }
 
 fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
-    let texts = facts.texts();
+    let texts = facts.texts;
     if facts.measured.is_empty() {
+        let [colon, between] = ["language.colon", "language.clause"].map(|key| texts.language.text(key));
         let lost = facts
             .by_status
             .iter()
-            .map(|(s, stones)| format!("{}: {}", escape(texts.status(*s)), count(stones.len())));
-        let reasons = lost.collect::<Vec<_>>().join("; ");
+            .map(|(s, stones)| format!("{}{colon}{}", escape(texts.status(*s)), count(stones.len())));
+        let reasons = lost.collect::<Vec<_>>().join(between);
         return vec![format!(
             "<b>{}.</b> {reasons}",
             capital(texts.clauses.nothing_measured)
@@ -109,7 +106,7 @@ fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
 
 /// Where the motions are, all of them and the largest.
 fn places(facts: &Summary) -> Vec<String> {
-    let texts = facts.texts();
+    let texts = facts.texts;
     let between = |[from, to]: [Point2<f64>; 2]| {
         let [a0, a1, u0, u1] = [from.x, to.x, from.y, to.y].map(|v| texts.number(v, 1));
         let values = [("a0", &*a0), ("a1", &*a1), ("u0", &*u0), ("u1", &*u1)];
@@ -136,7 +133,7 @@ fn chance(facts: &Summary) -> String {
         ("chance", &*count(expected)),
         ("n", &*count(facts.moved.len())),
     ];
-    fill(facts.texts().page.chance, &values)
+    fill(facts.texts.page.chance, &values)
 }
 
 /// The text with a capital at its beginning.
@@ -151,7 +148,7 @@ fn capital(text: &str) -> String {
 
 /// Outcomes, largest motions, loose stones, stretches.
 pub(super) fn tables(results: &ResultSet, facts: &Summary) -> String {
-    let texts = facts.texts();
+    let texts = facts.texts;
     let names = &texts.stones;
     let mut out = format!("<h3>{}</h3>", names.outcomes);
     let rows: Vec<Vec<String>> = facts
@@ -198,7 +195,7 @@ pub(super) fn tables(results: &ResultSet, facts: &Summary) -> String {
 }
 
 fn stone_rows(results: &ResultSet, facts: &Summary, stones: &[(&StoneRow, &RowMotion)]) -> String {
-    let texts = facts.texts();
+    let texts = facts.texts;
     let names = &texts.stones;
     let head = [
         names.stone,
@@ -256,7 +253,7 @@ fn stretches(results: &ResultSet, facts: &Summary) -> String {
     if n < 2 || to - from < 1e-6 {
         return String::new();
     }
-    let texts = facts.texts();
+    let texts = facts.texts;
 
     let edge = |i: usize| from + (to - from) * i as f64 / n as f64;
     let row = |i: usize| {

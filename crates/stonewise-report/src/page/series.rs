@@ -14,7 +14,7 @@ use stonewise_results::{ResultSet, StoneRow, nice_scale_m};
 
 /// The four answers, the model and the map of velocity; empty where there are only two epochs.
 pub(super) fn series(results: &ResultSet, facts: &Summary) -> String {
-    let texts = facts.texts();
+    let texts = facts.texts;
     let Some(found) = results.verdict.as_ref().and_then(|v| v.series.as_ref()) else {
         return String::new();
     };
@@ -31,7 +31,7 @@ pub(super) fn series(results: &ResultSet, facts: &Summary) -> String {
 
 /// The four answers.
 pub(super) fn answers(answers: &SeriesVerdict, texts: &Texts) -> String {
-    let names = texts.series;
+    let names = &texts.series;
     let all = [
         &answers.as_predicted,
         &answers.as_in_the_past,
@@ -59,7 +59,7 @@ fn word(answer: Word, names: &SeriesTexts) -> &'static str {
 
 /// The terms of the model, and what the epochs cannot carry.
 pub(super) fn terms(results: &ResultSet, texts: &Texts) -> String {
-    let names = texts.series;
+    let names = &texts.series;
     let Some(trends) = &results.trends else {
         return String::new();
     };
@@ -87,7 +87,7 @@ pub(super) fn terms(results: &ResultSet, texts: &Texts) -> String {
 
 /// The path of every zone with its model, and the conditions beneath.
 pub(super) fn paths(results: &ResultSet, texts: &Texts) -> String {
-    let names = texts.series;
+    let names = &texts.series;
     let Some(trends) = &results.trends else {
         return String::new();
     };
@@ -132,7 +132,7 @@ type Say<'a> = dyn Fn(&[(&str, &str)]) -> String + 'a;
 
 /// What a zone does, in sentences.
 fn path_in_words(zone: &ZoneTrend, texts: &Texts) -> String {
-    let names = texts.series;
+    let names = &texts.series;
     // A coefficient for ten units, so that the number has digits.
     let said = |found: &EstimateRecord, factor: f64, say: &Say| {
         let [along, up, out] = found.value.map(|v| texts.mm(v * factor));
@@ -173,8 +173,8 @@ pub(super) fn map(results: &ResultSet, facts: &Summary) -> String {
     if results.courses.is_empty() {
         return String::new();
     }
-    let names = facts.texts().series;
-    let layout = MapLayout::new(results, facts.texts());
+    let names = &facts.texts.series;
+    let layout = MapLayout::new(results, facts.texts);
     let speed = |s: &StoneRow| results.courses.get(&s.stone_id).map(|c| c.velocity.norm());
     let picture = MapPicture {
         title: names.map,

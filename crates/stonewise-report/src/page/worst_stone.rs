@@ -15,7 +15,7 @@ pub(super) fn before_and_after(results: &ResultSet, facts: &Summary) -> String {
     if !facts.verdict.is_sound() {
         return String::new();
     }
-    let (texts, page) = (facts.texts(), &facts.texts().page);
+    let (texts, page) = (facts.texts, &facts.texts.page);
     let motion = |id: u32| Some((id, facts.measured.iter().find(|(s, _)| s.stone_id == id)?.1));
     let Some((id, motion)) = named(&facts.verdict).into_iter().find_map(motion) else {
         return String::new();

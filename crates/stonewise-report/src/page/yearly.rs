@@ -13,22 +13,21 @@ use stonewise_results::records::{DatumState, EpochRecord, EpochVerdict, RunRecor
 
 /// The report of a series as one HTML document without anything that runs; `newest`: the results of the newest epoch.
 /// `None` without a series.
-pub(crate) fn yearly(newest: &ResultSet) -> Option<String> {
+pub(crate) fn yearly(newest: &ResultSet, facts: &Summary) -> Option<String> {
     let (run, verdict) = (newest.run.as_ref()?, newest.verdict.as_ref()?);
     let answers = verdict.series.as_ref()?;
-    let facts = Summary::new(newest);
-    let texts = facts.texts();
-    let names = texts.yearly;
+    let texts = facts.texts;
+    let names = &texts.yearly;
     let version = [("version", &*run.version)];
     let parts = [
         format!(
             "{}{}<p>{}</p>",
-            letter(&facts),
+            letter(facts),
             surveys(run, texts),
             fill(names.method, &version)
         ),
         format!("{}{}", of_epochs(run, texts), series::terms(newest, texts)),
-        results(newest, verdict, &facts),
+        results(newest, verdict, facts),
         format!(
             "<p>{}</p>{}",
             with_units(&escape(&answers.sentence)),
@@ -58,7 +57,7 @@ pub(crate) fn yearly(newest: &ResultSet) -> Option<String> {
 
 /// What was measured in each epoch.
 fn surveys(run: &RunRecord, texts: &Texts) -> String {
-    let names = texts.yearly;
+    let names = &texts.yearly;
     let dash = || "\u{2013}".to_owned();
     let row = |(i, epoch): (usize, &EpochRecord)| {
         let datum = match run.datum.get(&epoch.name) {
@@ -99,8 +98,8 @@ fn of_epochs(run: &RunRecord, texts: &Texts) -> String {
 }
 
 fn results(newest: &ResultSet, verdict: &Verdict, facts: &Summary) -> String {
-    let texts = facts.texts();
-    let names = texts.yearly;
+    let texts = facts.texts;
+    let names = &texts.yearly;
     let rows: Vec<Vec<String>> = verdict.epochs.iter().map(|e| epoch_row(e, texts)).collect();
     let paths = series::paths(newest, texts);
     let sentence = verdict.epochs.last().map_or("", |e| &e.sentence);
@@ -129,7 +128,7 @@ fn beside(newest: &ResultSet, texts: &Texts) -> String {
 }
 
 fn epoch_row(epoch: &EpochVerdict, texts: &Texts) -> Vec<String> {
-    let names = texts.yearly;
+    let names = &texts.yearly;
     let dash = || "\u{2013}".to_owned();
     let mm = |v: f64| texts.mm(v / 1e3);
 
@@ -170,7 +169,7 @@ fn epoch_row(epoch: &EpochVerdict, texts: &Texts) -> Vec<String> {
 
 /// What the engineer writes about, and what the measurements say for it.
 fn interpretation(newest: &ResultSet, run: &RunRecord, verdict: &Verdict, texts: &Texts) -> String {
-    let names = texts.yearly;
+    let names = &texts.yearly;
     let mut facts: Vec<String> = Vec::new();
     facts.extend(verdict.epochs.last().map(|e| escape(&e.sentence)));
     facts.extend(verdict.series.as_ref().map(|s| escape(&s.sentence)));

@@ -7,14 +7,14 @@ use super::judged::{
     Compared, FALSE_DISCOVERY_RATE, Finding, Judged, JudgedJoint, JudgedStone, Outcome, millimetres,
 };
 use super::sentence::{reasons, sentence};
+use crate::texts::Texts;
 use nalgebra::Point2;
-use stonewise_base::report_params::Language;
 use stonewise_base::thresholds::{Level, Quantity, Thresholds, Zone};
 use stonewise_core::statistics::q_values;
 use stonewise_results::records::{EpochVerdict, JointVerdict, State, StoneVerdict, ZoneVerdict};
 
 /// The verdict on a pair of epochs.
-pub(crate) fn assess(case: &Case, thresholds: &Thresholds, language: Language) -> EpochVerdict {
+pub(crate) fn assess(case: &Case, thresholds: &Thresholds, texts: &'static Texts) -> EpochVerdict {
     let judged = judge(case, thresholds);
     let whole = area(case, thresholds, &judged, None);
     let zone = |(number, zone): (usize, &Zone)| ZoneVerdict {
@@ -27,8 +27,8 @@ pub(crate) fn assess(case: &Case, thresholds: &Thresholds, language: Language) -
         reference: case.epochs[0].clone(),
         datum: case.datum,
         state: whole.state,
-        sentence: sentence(case, thresholds, &judged, &whole, language),
-        reasons: reasons(case, thresholds, &judged, &whole, language),
+        sentence: sentence(case, thresholds, &judged, &whole, texts),
+        reasons: reasons(case, thresholds, &judged, &whole, texts),
         wall: whole,
         zones,
         deformation: judged.deformation.clone(),

@@ -6,6 +6,7 @@ use super::interval::Estimate;
 use super::judged::millimetres;
 use super::lost::lost_stones;
 use super::time::Course;
+use crate::texts::Texts;
 use nalgebra::{Point2, Vector3, center};
 use stonewise_base::report_params::Language;
 use stonewise_base::thresholds::Thresholds;
@@ -31,6 +32,16 @@ pub fn verdict_on(
     thresholds: &Thresholds,
     language: Language,
 ) -> EpochVerdict {
+    verdict_in(results, pair, thresholds, Texts::of(language))
+}
+
+/// The same in these texts.
+pub(crate) fn verdict_in(
+    results: &ResultSet,
+    pair: &Pair,
+    thresholds: &Thresholds,
+    texts: &'static Texts,
+) -> EpochVerdict {
     let converged = results
         .registration
         .as_ref()
@@ -45,7 +56,7 @@ pub fn verdict_on(
         joints: joints(results).iter().filter_map(|j| joint(results, j)).collect(),
         deformation: deformation(results),
     };
-    assess(&case, thresholds, language)
+    assess(&case, thresholds, texts)
 }
 
 fn stones(results: &ResultSet, course: &Course) -> Vec<StoneCase> {

@@ -22,8 +22,11 @@ pub(crate) mod testing;
 mod tests;
 mod time;
 
+pub(crate) use evidence::verdict_in;
 pub use evidence::{Pair, verdict_on};
 pub(crate) use sentence::zone_in_words;
+#[cfg(test)]
+pub(crate) use series::answers;
 pub(crate) use series::name as term_name;
 pub use series::{inseparable_in_words, series_verdict};
 pub use time::Course;

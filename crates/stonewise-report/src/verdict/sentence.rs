@@ -5,7 +5,6 @@ use super::case::Case;
 use super::judged::{Finding, Judged};
 use super::limits::{Placed, in_words, of_attention};
 use crate::texts::{Texts, counted, fill};
-use stonewise_base::report_params::Language;
 use stonewise_base::thresholds::{Level, Quantity, Thresholds};
 use stonewise_core::registration::{ZONE_EXTENTS_M, ZoneKind};
 use stonewise_figure::count;
@@ -26,20 +25,21 @@ pub(super) fn sentence(
     thresholds: &Thresholds,
     judged: &Judged,
     wall: &Area,
-    language: Language,
+    texts: &'static Texts,
 ) -> String {
     let speaker = Speaker {
         case,
         thresholds,
         judged,
         wall,
-        texts: Texts::of(language),
+        texts,
     };
     let mut clauses: Vec<String> = speaker.deciding().iter().map(|r| speaker.clause(*r)).collect();
     clauses.extend(speaker.numbers());
     clauses.extend(speaker.shape());
     clauses.extend(speaker.not_measured());
-    format!("{}: {}.", speaker.texts.state(wall.state), clauses.join("; "))
+    let [colon, between] = ["language.colon", "language.clause"].map(|key| texts.language.text(key));
+    format!("{}{colon}{}.", texts.state(wall.state), clauses.join(between))
 }
 
 /// Every reason in words.
@@ -48,14 +48,14 @@ pub(super) fn reasons(
     thresholds: &Thresholds,
     judged: &Judged,
     wall: &Area,
-    language: Language,
+    texts: &'static Texts,
 ) -> Vec<Reason> {
     let speaker = Speaker {
         case,
         thresholds,
         judged,
         wall,
-        texts: Texts::of(language),
+        texts,
     };
     let reason = |code: &ReasonCode| Reason {
         code: *code,

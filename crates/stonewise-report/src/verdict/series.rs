@@ -8,7 +8,10 @@ use stonewise_results::records::{AnswerVerdict, SeriesVerdict, TrendsRecord};
 
 /// The four answers with their sentences.
 pub fn series_verdict(found: &TrendsRecord, language: Language) -> SeriesVerdict {
-    let texts = Texts::of(language);
+    answers(found, Texts::of(language))
+}
+
+pub(crate) fn answers(found: &TrendsRecord, texts: &Texts) -> SeriesVerdict {
     let names = &texts.series;
     let answers = &found.answers;
     let [predicted, past, trend, anomaly] = [
@@ -32,7 +35,7 @@ pub fn series_verdict(found: &TrendsRecord, language: Language) -> SeriesVerdict
         names.intro,
         &[
             ("n", &*count(found.epochs.len())),
-            ("answers", &*clauses.join("; ")),
+            ("answers", &*clauses.join(texts.language.text("language.clause"))),
         ],
     );
     let with = |text: String, answer: &Answer| AnswerVerdict {

@@ -4,6 +4,7 @@ use super::assess::assess;
 use super::case::{Case, JointCase, StoneCase, StoneMeasured};
 use super::interval::Estimate;
 use super::testing::Normal;
+use crate::texts::Texts;
 use nalgebra::{Matrix3, Point2, Vector3};
 use stonewise_base::report_params::Language;
 use stonewise_base::thresholds::{Quantity, Thresholds};
@@ -64,7 +65,7 @@ pub(super) fn wall(moving: u32, length_m: f64, seed: u64) -> Case {
 }
 
 pub(super) fn judge(case: &Case, thresholds: &Thresholds) -> EpochVerdict {
-    assess(case, thresholds, Language::English)
+    assess(case, thresholds, Texts::of(Language::English))
 }
 
 pub(super) fn codes(verdict: &EpochVerdict) -> Vec<ReasonCode> {
@@ -359,7 +360,7 @@ fn at_most_five_percent_of_the_stones_said_to_have_moved_stood_still() {
 
 #[test]
 fn the_sentence_speaks_german_too() {
-    let verdict = assess(&wall(3, 0.015, 4), &usual(), Language::German);
+    let verdict = assess(&wall(3, 0.015, 4), &usual(), Texts::of(Language::German));
     assert!(
         verdict.sentence.starts_with("Alarm: 3 Steine haben sich \u{fc}ber die Alarmschwelle von 10 mm hinaus bewegt; die gr\u{f6}\u{df}te Bewegung betr\u{e4}gt 1"),
         "{}",
@@ -448,7 +449,7 @@ fn fine_needs_the_shape_too() {
         ..bulged(true)
     };
     assert_eq!(judge(&unknown, &none).state, State::Attention);
-    let german = assess(&bulged(true), &none, Language::German).sentence;
+    let german = assess(&bulged(true), &none, Texts::of(Language::German)).sentence;
     let words = "eine Zone von 2,1 x 1,4 m hat sich gegenüber der übrigen Mauer um 1,9 mm ausgebaucht (95-%-Intervall 1,7 bis 2,1 mm)";
     assert!(german.contains(words), "{german}");
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use std::fmt;
-use stonewise_base::messages::Said;
+use stonewise_base::messages::{Said, Translations, recorded};
 use stonewise_base::report_params::Language;
 use stonewise_core::geometry::{SmallMotion, lever};
 
@@ -65,9 +65,9 @@ pub struct Datum {
     pub sources: Vec<SourceError>,
     /// What is known about the datum, in one sentence.
     pub note: String,
-    /// The sentence in German; in a record, only where its report is in German.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub german: Option<String>,
+    /// The sentence in other languages; in a record, only in that of its report.
+    #[serde(default, skip_serializing_if = "Translations::is_empty")]
+    pub translations: Translations,
 }
 
 /// The estimated error of one station or strip against the mean of its epoch's sources, world.
@@ -95,7 +95,7 @@ impl Datum {
             taken_off: None,
             sources: Vec::new(),
             note: note.english,
-            german: note.german,
+            translations: note.translations,
         }
     }
 
@@ -117,7 +117,7 @@ impl Datum {
             taken_off: None,
             sources: Vec::new(),
             note: note.english,
-            german: note.german,
+            translations: note.translations,
         }
     }
 
@@ -140,14 +140,14 @@ impl Datum {
         Said {
             code: Some("datum".to_owned()),
             english: self.note.clone(),
-            german: self.german.clone(),
+            translations: self.translations.clone(),
         }
     }
 
     /// The registration as a record keeps it whose report is in this language.
     pub fn recorded(self, language: Language) -> Self {
         Self {
-            german: Said::german_in(self.german, language),
+            translations: recorded(self.translations, language),
             ..self
         }
     }

@@ -233,16 +233,13 @@ impl Api {
 
     /// The page itself, in the project's language, else the browser's.
     fn shell(&self, head: &Head) -> Response {
-        let wants_german = head
-            .header("accept-language")
-            .is_some_and(|l| l.starts_with("de"));
-        let by_browser = if wants_german {
-            Language::German
-        } else {
-            Language::English
-        };
+        let wanted = head.header("accept-language").unwrap_or_default();
+        let by_browser = Language::ALL
+            .into_iter()
+            .find(|language| wanted.starts_with(language.tag()));
         let project = self.read_project().ok();
-        assets::shell(project.map_or(by_browser, |p| p.settings.report.language))
+        let language = project.map(|p| p.settings.report.language);
+        assets::shell(language.or(by_browser).unwrap_or_default())
     }
 
     /// A page of the report, which holds its own scripts.
@@ -530,8 +527,8 @@ impl Api {
         let look = || check(&project, out, Depth::Full, &Silent);
         match catch_unwind(AssertUnwindSafe(look)) {
             Ok(Ok(report)) => {
-                let german = project.settings.report.language == Language::German;
-                shown.findings = report.findings.iter().map(|f| finding(f, german)).collect();
+                let language = project.settings.report.language;
+                shown.findings = report.findings.iter().map(|f| finding(f, language)).collect();
                 shown.is_done = true;
                 (shown, Some(report.page(&project)))
             }
@@ -553,12 +550,9 @@ impl Api {
             OutputFolder::of_project(&self.place.results, &project, false).map_err(|e| failed(&e))?;
         self.work(Job::Run, move |run| {
             let summary = stonewise::run(&project, &folder, Until::Reported, run)?;
-            let german = project.settings.report.language == Language::German;
+            let language = project.settings.report.language;
             Ok(move |shown: &mut RunShown| {
-                let said = |w: &stonewise::Warning| {
-                    let german = w.german.clone().filter(|_| german);
-                    format!("{}: {}", w.subject, german.unwrap_or_else(|| w.message.clone()))
-                };
+                let said = |w: &stonewise::Warning| w.text(language);
                 shown.doubts = summary.doubts().map(said).collect();
                 let skipped = summary.warnings.iter().filter(|w| w.skipped_input && !w.doubt);
                 shown.skipped = skipped.map(said).collect();
@@ -779,8 +773,7 @@ fn check_edit(edit: &Edit, epochs: &[&str]) -> Result<(), Response> {
     mistake.map_or(Ok(()), |message| Err(Mistake::new(message).into()))
 }
 
-fn finding(finding: &Finding, german: bool) -> FindingShown {
-    let said = finding.said();
+fn finding(finding: &Finding, language: Language) -> FindingShown {
     FindingShown {
         epoch: finding.epoch.clone(),
         weight: match finding.verdict {
@@ -790,7 +783,7 @@ fn finding(finding: &Finding, german: bool) -> FindingShown {
             Verdict::Wrong => Weight::Wrong,
             Verdict::Unreadable => Weight::Unreadable,
         },
-        text: said.german.filter(|_| german).unwrap_or(said.english),
+        text: finding.said().text(language).to_owned(),
     }
 }
 

@@ -73,8 +73,8 @@ const FIGURE: Layers = &[
 ];
 
 const BASE: Layers = &[
-    &["processor", "report_params", "thresholds"],
-    &["error", "messages"],
+    &["language", "processor", "thresholds"],
+    &["error", "messages", "report_params"],
     &["stable"],
     &["settings"],
     &["address_space", "files", "part", "warnings"],

@@ -54,18 +54,14 @@ pub enum Phase {
 impl Phase {
     /// The phase in words.
     pub fn words(self, language: Language) -> &'static str {
-        let [english, german] = match self {
-            Self::Read => ["read the survey", "Aufnahme einlesen"],
-            Self::Find => ["find the stones", "Steine finden"],
-            Self::Match => ["match the stones", "Steine zuordnen"],
-            Self::Measure => ["measure the motions", "Bewegungen messen"],
-            Self::Compare => ["compare the clouds", "Punktwolken vergleichen"],
-            Self::Write => ["write the results", "Ergebnisse schreiben"],
-        };
-        match language {
-            Language::English => english,
-            Language::German => german,
-        }
+        language.text(match self {
+            Self::Read => "phases.read",
+            Self::Find => "phases.find",
+            Self::Match => "phases.match",
+            Self::Measure => "phases.measure",
+            Self::Compare => "phases.compare",
+            Self::Write => "phases.write",
+        })
     }
 }
 

@@ -4,21 +4,13 @@ use crate::report_params::Language;
 use crate::results::records::CheckRecord;
 use crate::texts::{Message, Said};
 
-/// Words in English and in German.
-type Words = [&'static str; 2];
-
-/// What is checked, and against what.
+/// What is checked, and against what. Under the name of the check, the files of texts say `what` the statistic is, the
+/// `source` of the limit, and the `remedy` where the check fails, which is said after the message.
 pub(super) struct Rule {
-    /// The statistic in plain words.
-    pub what: Words,
     /// What it is compared with.
     pub limit: Limit,
-    /// Where the limit is from.
-    pub source: Words,
     /// What is said where the check fails; its code is the name of the check.
     pub message: &'static Message,
-    /// What to do where the check fails, said after the message.
-    pub remedy: Words,
 }
 
 /// On which side of a number a statistic must lie.
@@ -37,16 +29,27 @@ impl Rule {
         }
     }
 
+    /// The name of the check.
+    pub fn name(&self) -> &'static str {
+        self.message.code.unwrap_or_default()
+    }
+
+    /// What the file of a language says of the rule.
+    pub fn text(&self, what: &str, language: Language) -> &'static str {
+        language.text(&format!("checks.{}.{what}", self.name()))
+    }
+
     /// The check of a statistic; `values`: those of the message.
     pub fn check<const N: usize>(
         &'static self,
         statistic: f64,
         values: impl FnOnce() -> [(&'static str, Said); N],
     ) -> Check {
+        let remedy = |language| self.text("remedy", language);
         Check {
             rule: self,
             statistic,
-            doubt: (!self.passes(statistic)).then(|| self.message.say(&values()).and(self.remedy)),
+            doubt: (!self.passes(statistic)).then(|| self.message.say(&values()).and(remedy)),
         }
     }
 }
@@ -62,24 +65,21 @@ pub(super) struct Check {
 impl Check {
     /// The check of this epoch as registration.json has it, in the language of the report.
     pub fn record(&self, epoch: &str, language: Language) -> CheckRecord {
-        let in_language = |[english, german]: Words| match language {
-            Language::English => english.to_owned(),
-            Language::German => german.to_owned(),
-        };
+        let text = |what| self.rule.text(what, language).to_owned();
         let (limit, at_least) = match self.rule.limit {
             Limit::AtLeast(limit) => (limit, true),
             Limit::AtMost(limit) => (limit, false),
         };
         CheckRecord {
-            name: self.rule.message.code.unwrap_or_default().to_owned(),
-            what: in_language(self.rule.what),
+            name: self.rule.name().to_owned(),
+            what: text("what"),
             epoch: epoch.to_owned(),
             statistic: self.statistic,
             limit,
             at_least,
-            source: in_language(self.rule.source),
+            source: text("source"),
             passed: self.doubt.is_none(),
-            remedy: self.doubt.as_ref().map(|_| in_language(self.rule.remedy)),
+            remedy: self.doubt.as_ref().map(|_| text("remedy")),
         }
     }
 }

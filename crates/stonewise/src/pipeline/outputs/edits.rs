@@ -37,16 +37,13 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
             .iter()
             .any(|epoch| matches!(epoch[index], Some(Ok(_))));
         if !has_effect {
-            let listed = |said: fn(&Said) -> &str| {
+            let reasons = Said::in_each(|language| {
+                let [colon, between] = ["language.colon", "language.clause"].map(|key| language.text(key));
                 let texts = reasons
                     .iter()
-                    .map(|(epoch, reason)| format!("{epoch}: {}", said(reason)));
-                texts.collect::<Vec<_>>().join("; ")
-            };
-            let reasons = Said {
-                german: Some(listed(Said::in_german)),
-                ..listed(|said| &said.english).into()
-            };
+                    .map(|(epoch, reason)| format!("{epoch}{colon}{}", reason.text(language)));
+                texts.collect::<Vec<_>>().join(between)
+            });
             let words = [("edit", edit.action.word().into()), ("reasons", reasons)];
             let message = EDIT_WITHOUT_EFFECT.say(&words);
             context.warnings.skipped("edit", file.place(index), message);
