@@ -1,5 +1,5 @@
 //! Readers and writers of the formats that surveys come in and results go out: point clouds, posed photos,
-//! masks, tables, and layers for GIS.
+//! masks, tables, adjusted networks, and layers for GIS.
 //!
 //! M3C2 of two clouds, of whichever [format](cloud::CloudFormat):
 //!
@@ -56,6 +56,7 @@ pub mod image_io;
 pub mod layers;
 pub mod masks;
 pub mod mesh_ply;
+pub mod network;
 mod photo_name;
 pub mod table;
 pub mod text;

@@ -41,7 +41,7 @@ const IO: Layers = &[
     &["atomic", "crs", "exif", "folder", "photo_name", "wall"],
     &["image_io"],
     &["cameras", "cloud", "mesh_ply", "table"],
-    &["layers", "masks"],
+    &["layers", "masks", "network"],
 ];
 
 const SEGMENT: Layers = &[
