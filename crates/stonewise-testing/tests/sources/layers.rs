@@ -109,6 +109,7 @@ const REPORT: Layers = &[
 const PROJECT: Layers = &[
     &["dated_csv"],
     &["conditions", "edits", "init", "instruments", "sources"],
+    &["networks"],
     &["project_type"],
     &["distances", "origin"],
     &["check", "project_file", "project_parameters", "split"],
