@@ -3,7 +3,7 @@
 use crate::conditions::ConditionsFile;
 use crate::edits::EditsFile;
 use crate::instruments::InstrumentFile;
-use crate::networks::{NetworkFile, NetworkMotion};
+use crate::networks::NetworkFile;
 use crate::sources::SourceRule;
 use nalgebra::Point3;
 use schemars::JsonSchema;
@@ -209,11 +209,9 @@ impl Project {
         files.chain(networks).map(PathBuf::as_path)
     }
 
-    /// The network of a later epoch, and what its points moved since the reference.
-    pub fn network_motion(&self, later: EpochId) -> Option<(&NetworkFile, NetworkMotion<'_>)> {
-        let of = |epoch: EpochId| self.networks.iter().find(move |n| n.epoch == epoch);
-        let (first, later) = (of(EpochId::REFERENCE)?, of(later)?);
-        Some((later, later.motion_since(first)))
+    /// The adjusted network of an epoch.
+    pub fn network(&self, epoch: EpochId) -> Option<&NetworkFile> {
+        self.networks.iter().find(|n| n.epoch == epoch)
     }
 
     /// Whether the stones themselves bring an epoch to the frame of the reference.
