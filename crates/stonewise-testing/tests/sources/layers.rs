@@ -40,7 +40,7 @@ const IO: Layers = &[
     &["text", "xml"],
     &["atomic", "crs", "exif", "folder", "photo_name", "wall"],
     &["image_io"],
-    &["cameras", "cloud", "mesh_ply", "table"],
+    &["cameras", "cloud", "dxf", "mesh_ply", "table"],
     &["layers", "masks", "network"],
 ];
 
