@@ -156,3 +156,42 @@ fn escaped(text: &str) -> String {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_and_a_text_are_the_groups_of_the_reference() {
+        let shape = |layer: &str, form| Shape {
+            layer: layer.to_owned(),
+            form,
+        };
+        let line = |x: f64| Form::Line {
+            vertices: vec![Point2::new(x, 0.0), Point2::new(1.0, 2.5)],
+            is_closed: true,
+        };
+        let text = Form::Text {
+            middle: Point2::new(0.5, -1.0),
+            height_m: 0.1,
+            text: "\u{e4}\n7".to_owned(),
+        };
+        let drawing = Drawing {
+            layers: [("A".to_owned(), 1)].into(),
+            shapes: vec![
+                shape("A", line(0.0)),
+                shape("A", line(f64::NAN)),
+                shape("A", text),
+            ],
+        };
+        let found = dxf(&drawing);
+        let (_, entities) = found.split_once("ENTITIES\n").unwrap();
+        let groups: Vec<&str> = entities.lines().map(str::trim).collect();
+        let expected = "0 POLYLINE 8 A 66 1 10 0.00000 20 0.00000 30 0.0 70 1 \
+                        0 VERTEX 8 A 10 0.00000 20 0.00000 30 0.0 0 VERTEX 8 A 10 1.00000 20 2.50000 30 0.0 0 SEQEND 8 A \
+                        0 TEXT 8 A 10 0.50000 20 -1.00000 30 0.0 40 0.10000 1 \\U+00E4_7 72 1 \
+                        11 0.50000 21 -1.00000 31 0.0 73 2 0 ENDSEC 0 EOF";
+        let found: Vec<String> = groups.iter().map(|g| g.replace(' ', "_")).collect();
+        assert_eq!(found.join(" "), expected);
+    }
+}

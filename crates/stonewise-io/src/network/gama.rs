@@ -17,12 +17,6 @@ pub(super) fn read(path: &Path) -> Result<(Raw, Begins), NetworkError> {
     let text = text_of(path)?;
     let document = parse(&text).map_err(|e| error(path, e.line as usize, e.problem))?;
     let at = |element: Element<'_>, message: String| error(path, element.line(), message);
-    let child = |of: Element<'_>, name: &str| {
-        of.child(name).ok_or_else(|| {
-            let message = format!("<{}> lacks <{name}>: is the file complete?", of.name());
-            at(of, message)
-        })
-    };
     let root = Element::root(&document);
     if root.name() != "gama-local-adjustment" {
         let message = format!(
@@ -35,16 +29,16 @@ pub(super) fn read(path: &Path) -> Result<(Raw, Begins), NetworkError> {
         let said: Vec<String> = failed.all("description").map(Element::text).collect();
         return Err(at(failed, format!("gama-local failed: {}", said.join(" "))));
     }
-    let parameters = child(root, "network-general-parameters")?;
+    let parameters = child(path, root, "network-general-parameters")?;
     let axes = Axes::of(parameters).map_err(|message| at(parameters, message))?;
-    let coordinates = child(root, "coordinates")?;
+    let coordinates = child(path, root, "coordinates")?;
 
     let mut raw = Raw::default();
     // Of each row, the sign of its covariances with others.
     let mut signs = Vec::new();
     for (kind, is_adjusted) in [("fixed", false), ("adjusted", true)] {
-        for point in child(coordinates, kind)?.all("point") {
-            let name = child(point, "id")?.text().trim().to_owned();
+        for point in child(path, coordinates, kind)?.all("point") {
+            let name = child(path, point, "id")?.text().trim().to_owned();
             let of = raw.point(&name, point.line());
             for (axis, names) in [["x", "X"], ["y", "Y"], ["z", "Z"]].into_iter().enumerate() {
                 let Some(found) = names.into_iter().find_map(|name| point.child(name)) else {
@@ -66,9 +60,9 @@ pub(super) fn read(path: &Path) -> Result<(Raw, Begins), NetworkError> {
         }
     }
 
-    let matrix = child(coordinates, "cov-mat")?;
+    let matrix = child(path, coordinates, "cov-mat")?;
     let size = |name: &str| {
-        let found = child(matrix, name)?;
+        let found = child(path, matrix, name)?;
         let text = found.text();
         text.trim()
             .parse::<usize>()
@@ -103,6 +97,14 @@ pub(super) fn read(path: &Path) -> Result<(Raw, Begins), NetworkError> {
         line: matrix.line(),
     };
     Ok((raw, begins))
+}
+
+/// The part of an element, which must be there.
+fn child<'a>(path: &Path, of: Element<'a>, name: &str) -> Result<Element<'a>, NetworkError> {
+    of.child(name).ok_or_else(|| {
+        let message = format!("<{}> lacks <{name}>: is the file complete?", of.name());
+        error(path, of.line(), message)
+    })
 }
 
 /// Where the axes of a file point.

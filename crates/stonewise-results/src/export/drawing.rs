@@ -142,3 +142,82 @@ fn line_of_text(stone: &StoneRow, middle: Point2<f64>, side: f64, text: String) 
         text,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::records::{StoneVerdict, VERDICT_VERSION, Verdict};
+    use crate::testing::{folder, rows, run_record};
+    use stonewise_base::thresholds::Thresholds;
+
+    /// How many shapes lie on each layer.
+    fn counts(drawing: &Drawing) -> BTreeMap<&str, usize> {
+        let mut counts = BTreeMap::new();
+        for shape in &drawing.shapes {
+            *counts.entry(shape.layer.as_str()).or_default() += 1;
+        }
+        counts
+    }
+
+    #[test]
+    fn stones_lie_on_the_layer_of_their_state() {
+        let folder = folder(&rows());
+        let mut results = ResultSet::read(folder.path()).unwrap();
+        let mut drawing = Drawing::default();
+        draw(&mut drawing, &results);
+        // Of 24 stones 20 were measured; the third is lost.
+        let expected = [
+            ("E2_ARROW_CANNOT_TELL", 20),
+            ("E2_OUTLINE_CANNOT_TELL", 23),
+            ("E2_OUTLINE_LOST", 1),
+            ("E2_OUT_MM_CANNOT_TELL", 20),
+            ("EPOCHS", 1),
+            ("NUMBERS", 24),
+        ];
+        assert_eq!(counts(&drawing), BTreeMap::from(expected));
+        assert!(
+            drawing
+                .shapes
+                .iter()
+                .all(|s| drawing.layers.contains_key(&s.layer))
+        );
+
+        results.run = Some(run_record("Wall", &["A", "B"]));
+        let alarm = StoneVerdict {
+            stone_id: results.stones[0].stone_id,
+            state: State::Alarm,
+            ..StoneVerdict::default()
+        };
+        results.verdict = Some(Verdict {
+            version: VERDICT_VERSION,
+            state: State::Alarm,
+            sentence: String::new(),
+            thresholds: Thresholds::default(),
+            epochs: vec![EpochVerdict {
+                epoch: "B".to_owned(),
+                stones: vec![alarm],
+                ..EpochVerdict::default()
+            }],
+            series: None,
+        });
+        let mut drawing = Drawing::default();
+        draw(&mut drawing, &results);
+        let found = counts(&drawing);
+        let outlines = ["ALARM", "CANNOT_TELL", "LOST"].map(|state| found[&*format!("E2_OUTLINE_{state}")]);
+        assert_eq!(outlines, [1, 22, 1]);
+        assert_eq!(drawing.layers["E2_ARROW_ALARM"], 1);
+    }
+
+    #[test]
+    fn barbs_lie_on_either_side_of_an_arrow() {
+        let Form::Line { vertices, is_closed } = arrow(Point2::new(1.0, 2.0), Vector2::new(0.0, 10.0)) else {
+            panic!("an arrow is a line");
+        };
+        let [x, y] = [2.0 * 0.4_f64.sin(), 12.0 - 2.0 * 0.4_f64.cos()];
+        let expected = [[1.0, 2.0], [1.0, 12.0], [1.0 + x, y], [1.0, 12.0], [1.0 - x, y]];
+        assert!(!is_closed && vertices.len() == 5);
+        for (vertex, expected) in vertices.iter().zip(expected) {
+            assert!((vertex - Point2::from(expected)).norm() < 1e-12, "{vertex}");
+        }
+    }
+}
