@@ -3,10 +3,9 @@
 use crate::atomic::write_atomically;
 use nalgebra::Point2;
 use std::collections::BTreeMap;
-use std::fmt::Write;
-use std::fs;
-use std::io;
+use std::fmt::{Display, Write};
 use std::path::Path;
+use std::{fs, io};
 
 /// A flat drawing, metres.
 #[derive(Clone, Debug, Default)]
@@ -118,9 +117,9 @@ impl Shape {
 struct Groups(String);
 
 impl Groups {
-    fn tag(&mut self, code: u16, value: impl ToString) -> &mut Self {
+    fn tag(&mut self, code: u16, value: impl Display) -> &mut Self {
         // Writing into a string does not fail.
-        let _ = writeln!(self.0, "{code:>3}\n{}", value.to_string());
+        let _ = writeln!(self.0, "{code:>3}\n{value}");
         self
     }
 
