@@ -10,7 +10,7 @@ use crate::output::named_results_in;
 use crate::pipeline::verdict_of_tables;
 use crate::report::write_report;
 use crate::results::names::{
-    DISPLACEMENTS_VTP, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET, PairFile, RUN, SERIES, VERDICT,
+    DISPLACEMENTS_VTP, DRAWING, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET, PairFile, RUN, SERIES, VERDICT,
     is_of_report,
 };
 use crate::results::records::{EpochRecord, RunRecord};
@@ -187,7 +187,17 @@ fn made_again(results: &Path, run: &RunRecord) -> Result<Vec<Finding>> {
     if files.is_empty() {
         return Ok(Vec::new());
     }
-    files.extend([GEOPACKAGE, GEOPARQUET, FACES_VTP, DISPLACEMENTS_VTP, FACES_PLY].map(PathBuf::from));
+    files.extend(
+        [
+            GEOPACKAGE,
+            GEOPARQUET,
+            FACES_VTP,
+            DISPLACEMENTS_VTP,
+            FACES_PLY,
+            DRAWING,
+        ]
+        .map(PathBuf::from),
+    );
     write_report(scratch.path())?;
     write_layers(scratch.path())?;
     let other_maker = Maker::of(run).differs(&Maker::present());

@@ -69,9 +69,8 @@ fn write_run_record(run: &Run) -> Result<()> {
             .map(|file| input(context, &file.path))
             .transpose()?,
         instruments: project
-            .instruments
-            .iter()
-            .map(|file| input(context, &file.path))
+            .instrument_files()
+            .map(|file| input(context, file))
             .collect::<Result<_>>()?,
         parameters: project.settings.clone(),
         steps: context.times(),

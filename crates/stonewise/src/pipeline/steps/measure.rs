@@ -62,7 +62,7 @@ impl Run<'_> {
                 rows: &mut rows,
             };
             let normals = first.stones.iter().map(|s| (s.id, s.normal)).collect();
-            let instruments = compare(self.context.project, later, before, &normals);
+            let instruments = compare(self.context.project, later, before, &normals)?;
             Ok(Measured {
                 datum,
                 rows,
