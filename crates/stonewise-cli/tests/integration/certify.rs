@@ -49,7 +49,7 @@ fn a_certificate_has_all_parts_and_goes_on_where_it_stopped() {
 }
 
 #[test]
-#[ignore = "half a minute: .ci/nightly runs it"]
+#[ignore = "a minute: .ci/nightly runs it"]
 fn a_calibration_ranks_one_stone_of_each_wall_and_goes_on_where_it_stopped() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("certificate");

@@ -1,9 +1,9 @@
 //! Motions drawn from what the adjustment assumes of a wall beforehand.
 
-use super::AdjustmentParams;
 use super::field::{
     Graph, Least, LoosePrior, Node, Place, Tie, VarianceComponents, Vector9, prior, stone_from_field,
 };
+use super::params::AdjustmentParams;
 use super::stone_vector::StoneVector;
 use crate::registration::random::Random;
 use nalgebra::{DMatrix, DVector, Point3, Vector3, Vector6};
@@ -24,8 +24,8 @@ pub struct DrawnMotion {
 /// Draws motions from the prior of [`adjust`](crate::registration::adjust): the variance components, the ties, a field
 /// under them, and what each stone does beside it. `stones`: centroid and outward normal of each.
 ///
-/// The prior leaves the mean displacement of all stones open; it is taken off. `None` where the field has no factor. Cost:
-/// cubic in the stones, about a second for 150.
+/// The prior leaves the mean displacement of all stones open; it is taken off. `None` where the prior cannot be
+/// factored. Cost: cubic in the stones.
 pub fn draw_motions(
     stones: &[(Point3<f64>, Vector3<f64>)],
     params: &AdjustmentParams,
