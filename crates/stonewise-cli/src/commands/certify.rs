@@ -62,9 +62,10 @@ fn calibrated(args: &CertifyArgs, force: bool, printer: &Printer) -> Result<Outc
                 "--calibration takes the plan of a survey, with a table [wall], as `stonewise design` does";
             return Err(Error::Parameters(format!("{}: {needed}", file.display())).into());
         }
-        None => { names.iter() }
-            .map(|name| CalibratedSurvey::usual(name))
-            .collect::<stonewise::Result<_>>()?,
+        None => {
+            let usual = names.iter().map(|name| CalibratedSurvey::usual(name));
+            usual.collect::<stonewise::Result<_>>()?
+        }
     };
     let inputs: Vec<_> = args.project.iter().cloned().collect();
     let owner = Owner::inputs("certificate", &inputs);

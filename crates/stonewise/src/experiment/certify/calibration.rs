@@ -77,7 +77,8 @@ impl CalibratedSurvey {
             Error::Parameters(format!("no survey {name:?}: the names are {names}"))
         })?;
         let text = format!("wall = {{ width_m = {width_m:?}, height_m = {height_m:?} }}\n{tables}");
-        let plan = toml::from_str(&text).map_err(|e| Error::Parameters(format!("{name}: {e}")))?;
+        let plan: SurveyPlan =
+            toml::from_str(&text).map_err(|e| Error::Parameters(format!("{name}: {e}")))?;
         Ok(Self {
             name: name.to_owned(),
             ..Self::planned(&plan)
