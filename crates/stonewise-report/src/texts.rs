@@ -7,7 +7,7 @@ mod yearly;
 
 pub(crate) use instruments::InstrumentTexts;
 pub(crate) use report::{
-    AuditTexts, ChartTexts, CheckTexts, MapTexts, MethodTexts, ScoreTexts, SectionTexts, StoneTexts,
+    AuditTexts, ChartTexts, CheckTexts, InfluenceTexts, MapTexts, MethodTexts, ScoreTexts, SectionTexts, StoneTexts,
 };
 pub(crate) use series::SeriesTexts;
 pub(crate) use stonewise_base::messages::fill;
@@ -36,6 +36,7 @@ pub(crate) struct Texts {
     pub maps: MapTexts,
     pub charts: ChartTexts,
     pub checks: CheckTexts,
+    pub influence: InfluenceTexts,
     pub scores: ScoreTexts,
     pub method: MethodTexts,
     pub audit: AuditTexts,
@@ -410,6 +411,7 @@ static ENGLISH: Texts = Texts {
     maps: MapTexts::ENGLISH,
     charts: ChartTexts::ENGLISH,
     checks: CheckTexts::ENGLISH,
+    influence: InfluenceTexts::ENGLISH,
     scores: ScoreTexts::ENGLISH,
     method: MethodTexts::ENGLISH,
     audit: AuditTexts::ENGLISH,
@@ -666,6 +668,7 @@ static GERMAN: Texts = Texts {
     maps: MapTexts::GERMAN,
     charts: ChartTexts::GERMAN,
     checks: CheckTexts::GERMAN,
+    influence: InfluenceTexts::GERMAN,
     scores: ScoreTexts::GERMAN,
     method: MethodTexts::GERMAN,
     audit: AuditTexts::GERMAN,

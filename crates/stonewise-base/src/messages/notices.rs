@@ -141,6 +141,22 @@ messages! {
             Bewegungen um diesen Betrag falsch. Eine zweite stabile Fläche nennen, die dieselben Richtungen zeigt, oder diese vor Ort \
             ansehen. Die Verformung der Mauer hängt nicht davon ab";
 
+        KNOWN_LENGTH:
+            "length of {length_m} m in epoch {epoch}",
+            "Länge von {length_m} m in der Epoche {epoch}";
+
+        RESTS_ON_ONE = "rests-on-one":
+            "the verdict rests on {name} alone: without it, {change}",
+            "das Urteil beruht allein auf {name}: ohne diese Beobachtung {change}";
+
+        LARGEST_BEYOND:
+            "the largest motion would be {without_mm} mm, outside its 95 % interval of {low_mm} to {high_mm} mm",
+            "wäre die größte Bewegung {without_mm} mm und läge außerhalb ihres 95-%-Intervalls von {low_mm} bis {high_mm} mm";
+
+        STATE_CHANGES:
+            "its state would be another",
+            "wäre sein Zustand ein anderer";
+
         STABLE_TOO_FEW = "stable-too-few":
             "[[registration.stable]] does not show the epochs' registration: too few plane cells ({cells}) are seen in both epochs; it is \
             taken as unknown. Name areas with points in both epochs and faces in three directions, or state epoch_error_m",

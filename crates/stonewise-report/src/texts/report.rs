@@ -188,6 +188,22 @@ in_both! {
 }
 
 in_both! {
+    /// What the results rest on.
+    InfluenceTexts {
+        heading: "What the results rest on", "Worauf die Ergebnisse beruhen";
+        intro: "Smallest blunder: the offset that a test against all others finds (significance level 0.1 %, power 80 %). Largest motion and shift: \
+            the length of the largest motion, and the largest change of any motion, without it. A dash: nothing else shows it.",
+            "Kleinster Fehler: die Verschiebung, die ein Test gegen alle anderen findet (Signifikanzniveau 0,1 %, Güte 80 %). Größte Bewegung und \
+            Änderung: die Länge der größten Bewegung und die größte Änderung irgendeiner Bewegung ohne sie. Ein Strich: nichts anderes zeigt es.";
+        name: "source, stable area, instrument or length", "Quelle, stabile Fläche, Instrument oder Länge";
+        redundancy: "redundancy", "Redundanz";
+        blunder: "smallest blunder mm", "kleinster Fehler mm";
+        without: "largest motion without it mm", "größte Bewegung ohne sie mm";
+        shift: "shift without it mm", "Änderung ohne sie mm";
+    }
+}
+
+in_both! {
     /// The score against a known motion.
     ScoreTexts {
         stones: "Stones", "Steine";
