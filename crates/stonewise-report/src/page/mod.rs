@@ -11,6 +11,7 @@ mod excerpts;
 mod explorer;
 mod first_page;
 mod html;
+mod influence;
 mod instruments;
 mod look_first;
 mod maps;

@@ -129,7 +129,13 @@ fn verdict(results: &Path, run: &RunRecord, progress: &dyn Progress) -> Compared
         .iter()
         .map(|e| (e.name.as_str(), e.date.as_deref()))
         .collect();
-    let verdict = verdict_of_tables(results, &epochs, &run.warnings, &run.parameters, progress)?;
+    let verdict = verdict_of_tables(
+        results,
+        &epochs,
+        &run.warnings,
+        &run.parameters,
+        (progress, &|_, _| ()),
+    )?;
     let found: Value = read_json(&results.join(VERDICT))?;
     let headlines = [json(&run.verdict), json(&Some(verdict.headlines()))];
     if let Some(difference) = first_difference(&headlines[0], &headlines[1], &|_| Tolerance::ROUNDING) {

@@ -13,7 +13,7 @@ use crate::texts::notices::{
     DATUM_INSTRUMENTS, INSTRUMENTS_CONTRADICTED, INSTRUMENTS_DISAGREE, INSTRUMENTS_LEFT_OUT,
     INSTRUMENTS_UNDETERMINED,
 };
-use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Point3, Vector3, Vector6};
 use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_core::epoch::EpochId;
@@ -60,8 +60,85 @@ pub struct Before<'a> {
     pub taken_off: Vector6<f64>,
 }
 
-/// Compares instruments with the stones of a later epoch; those in use change the datum and the rows. `None` without
-/// instruments.
+/// The instruments that are observations of the datum.
+pub struct InUse {
+    centre: Point3<f64>,
+    /// Covariance of the registration before they were used.
+    known: Option<Matrix6<f64>>,
+    /// Covariance of the differences, m^2: three rows for each.
+    errors: DMatrix<f64>,
+    list: Vec<Used>,
+}
+
+struct Used {
+    name: String,
+    /// The stones around it.
+    stones: Vec<u32>,
+    difference: Difference,
+}
+
+/// What an instrument in use does to the results.
+pub struct InstrumentInfluence<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// How it agrees with the others.
+    pub tested: Tested,
+    /// What leaving it out adds to the registration error that is taken off; `None` where the others do not determine it.
+    pub change: Option<RegistrationError>,
+}
+
+impl InUse {
+    /// What each of them does to the results.
+    pub fn influences(&self) -> Vec<InstrumentInfluence<'_>> {
+        let Some(all) = self.agreement(|_| true, |used| used.difference.clone()) else {
+            return Vec::new();
+        };
+        let of_one = |(k, tested): (usize, &Tested)| {
+            let rest = self.agreement(|other| other != k, |used| used.difference.clone());
+            let is_determined = rest
+                .as_ref()
+                .map_or(self.known.is_some(), |rest| use_of(rest) == DatumUse::Observed);
+            let mean = rest.map_or_else(Vector6::zeros, |rest| rest.error.mean);
+            InstrumentInfluence {
+                name: &self.list[k].name,
+                tested: tested.clone(),
+                change: is_determined.then(|| RegistrationError {
+                    mean: mean - all.error.mean,
+                    ..all.error.clone()
+                }),
+            }
+        };
+        all.instruments.iter().enumerate().map(of_one).collect()
+    }
+
+    /// What they add to the registration error that is taken off where the motions of stones before change by `shift`,
+    /// metres.
+    pub fn following(&self, shift: impl Fn(u32) -> Vector3<f64>) -> Option<RegistrationError> {
+        let shifted = |used: &Used| {
+            let sum: Vector3<f64> = used.stones.iter().map(|stone| shift(*stone)).sum();
+            let mean = sum / used.stones.len().max(1) as f64;
+            Difference {
+                value: [0, 1, 2].map(|axis| used.difference.value[axis].map(|_| mean[axis])),
+                ..used.difference.clone()
+            }
+        };
+        Some(self.agreement(|_| true, shifted)?.error)
+    }
+
+    fn agreement(
+        &self,
+        is_kept: impl Fn(usize) -> bool,
+        difference: impl Fn(&Used) -> Difference,
+    ) -> Option<Agreement> {
+        let kept: Vec<usize> = (0..self.list.len()).filter(|&k| is_kept(k)).collect();
+        let differences: Vec<Difference> = kept.iter().map(|&k| difference(&self.list[k])).collect();
+        let errors = of_differences(&self.errors, &kept);
+        agreement(&differences, &errors, &self.centre, self.known.as_ref())
+    }
+}
+
+/// Compares instruments with the stones of a later epoch; those in use, which are returned, change the datum and the
+/// rows. `None` without instruments.
 ///
 /// # Errors
 /// A network of which no point lies at the wall.
@@ -70,7 +147,7 @@ pub fn compare(
     later: EpochId,
     before: Before,
     normals: &Normals,
-) -> Result<Option<InstrumentsEpoch>> {
+) -> Result<Option<(InstrumentsEpoch, Option<InUse>)>> {
     if project.instrument_files().next().is_none() {
         return Ok(None);
     }
@@ -94,9 +171,12 @@ pub fn compare(
     let with = |which: &dyn Fn(&Beside) -> bool| {
         let chosen: Vec<usize> = (0..beside.len()).filter(|&i| which(&beside[i])).collect();
         let differences: Vec<Difference> = chosen.iter().map(|&i| beside[i].difference.clone()).collect();
-        let rows: Vec<usize> = chosen.iter().flat_map(|i| 3 * i..3 * i + 3).collect();
-        let covariance = covariance.select_rows(&rows).select_columns(&rows);
-        agreement(&differences, &covariance, &centre, known.as_ref())
+        agreement(
+            &differences,
+            &of_differences(&covariance, &chosen),
+            &centre,
+            known.as_ref(),
+        )
     };
 
     if let Some(all) = with(&|_| true) {
@@ -106,7 +186,22 @@ pub fn compare(
 
     let in_use = with(&|b| b.instrument.is_used);
     record.datum = in_use.as_ref().map(use_of);
-    if let Some(found) = in_use.filter(|_| record.datum == Some(DatumUse::Observed)) {
+    let used = |b: &Beside| Used {
+        name: b.instrument.name.to_owned(),
+        stones: b.stones.iter().map(|s| s.stone_id).collect(),
+        difference: b.difference.clone(),
+    };
+    let list: Vec<usize> = (0..beside.len())
+        .filter(|&i| beside[i].instrument.is_used)
+        .collect();
+    let used = InUse {
+        centre,
+        known,
+        errors: of_differences(&covariance, &list),
+        list: list.iter().map(|&i| used(&beside[i])).collect(),
+    };
+    let is_observed = record.datum == Some(DatumUse::Observed);
+    if let Some(found) = in_use.filter(|_| is_observed) {
         let count = record.compared.iter().filter(|c| c.is_used).count();
         update(
             before,
@@ -117,7 +212,7 @@ pub fn compare(
         );
     }
 
-    Ok(Some(record))
+    Ok(Some((record, is_observed.then_some(used))))
 }
 
 /// Outward normals of stones.
@@ -233,6 +328,12 @@ fn beside<'a>(
         block += errors;
     }
     (all, covariance)
+}
+
+/// The covariance of some differences, of that of all.
+fn of_differences(covariance: &DMatrix<f64>, chosen: &[usize]) -> DMatrix<f64> {
+    let rows: Vec<usize> = chosen.iter().flat_map(|i| 3 * i..3 * i + 3).collect();
+    covariance.select_rows(&rows).select_columns(&rows)
 }
 
 fn why(gap: ReadingGap) -> WhyLeftOut {
