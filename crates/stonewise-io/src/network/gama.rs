@@ -5,7 +5,7 @@
 //! band, row by row. Where axes and angles turn in different directions Gama computes with y reversed: coordinates are
 //! turned back when they are written, covariances are not.
 
-use super::{AdjustedCoordinate, Begins, NetworkError, Raw, error, number, text_of};
+use super::adjusted::{AdjustedCoordinate, Begins, NetworkError, Raw, error, number, text_of};
 use crate::xml::{Element, parse};
 use nalgebra::DMatrix;
 use std::path::Path;

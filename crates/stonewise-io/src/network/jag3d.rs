@@ -2,7 +2,9 @@
 //! of five columns between tabs: point, X, Y or Z, metres, column in the covariance from 0, number of observations; and
 //! `NAME.cxx` with the whole covariance of all unknowns, m^2. X points north and Y east.
 
-use super::{AdjustedCoordinate, Begins, NetworkError, Raw, covariance_text, error, number, text_of};
+use super::adjusted::{
+    AdjustedCoordinate, Begins, NetworkError, Raw, covariance_text, error, number, text_of,
+};
 use nalgebra::DMatrix;
 use std::path::Path;
 

@@ -1,6 +1,8 @@
 //! A network as a table, with the lower triangle of its covariance in a file beside it.
 
-use super::{AdjustedCoordinate, Begins, NetworkError, Raw, covariance_text, error, number, text_of};
+use super::adjusted::{
+    AdjustedCoordinate, Begins, NetworkError, Raw, covariance_text, error, number, text_of,
+};
 use crate::table::{CsvError, CsvFile};
 use nalgebra::DMatrix;
 use std::path::Path;

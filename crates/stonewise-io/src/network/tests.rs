@@ -1,5 +1,5 @@
 use super::*;
-use nalgebra::Matrix3;
+use nalgebra::{DMatrix, Matrix3, Point3};
 use std::fs;
 
 const GAMA: &str = include_str!("../../../../testdata/network/adjusted.xml");

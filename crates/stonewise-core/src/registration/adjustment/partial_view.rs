@@ -13,8 +13,8 @@ const EXPECTED: f64 = 0.03;
 /// Sum of the squared hidden shares of as many stones as count for that: forty of which half is hidden.
 const STONES_EXPECTED: f64 = 10.0;
 
-/// Least hidden share of a stone that counts for the rate. The motion of a loose stone alone can make a fifth of its
-/// face seem hidden, so that stones of which less is hidden do not show whether clouds are wrong or stones are loose.
+/// Least hidden share of a stone that counts for the rate. Masks that differ and few points alone hide a fifth, so that
+/// stones of which less is hidden do not show whether clouds are wrong or stones are loose.
 const PARTLY_HIDDEN: f64 = 0.3;
 
 /// Points across a stone from which on its rims are clear, and below which nothing of them is. A grid of 43 to 113
@@ -37,7 +37,7 @@ pub(super) fn expected_rate() -> f64 {
 }
 
 /// How much less one epoch shows of each stone than is usual in the survey, as a share; `shared`: share of the
-/// face that both epochs show.
+/// face that both epochs show, wherever the stone moved.
 pub(super) fn hidden(shared: &[f64]) -> Vec<f64> {
     let Some(usual) = upper_median(&mut shared.to_vec()).filter(|u| *u > 0.0) else {
         return vec![0.0; shared.len()];

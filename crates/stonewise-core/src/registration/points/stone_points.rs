@@ -190,12 +190,12 @@ mod tests {
             near.iter_mut().for_each(|p| p.labelled &= is_shown(p));
             near
         };
-        // A part of the face, and parts of equal size that overlap by half, of 0.4 m.
+        // A part of the face of 0.4 m, and two of equal size, as if the stone had moved.
         for ([first, second], expected) in [
             ([[-0.2, 0.2], [-0.2, 0.2]], 1.0),
             ([[-0.2, 0.2], [-0.2, -0.1]], 0.25),
             ([[-0.2, -0.1], [-0.2, 0.2]], 0.25),
-            ([[-0.2, 0.0], [-0.1, 0.1]], 0.5),
+            ([[-0.2, 0.0], [-0.1, 0.1]], 1.0),
         ] {
             let (first, second) = (cut(first[0], first[1], 1), cut(second[0], second[1], 2));
             let found = stone_points([&first, &second], &Vector3::x(), &Vector3::zeros(), 3.0);

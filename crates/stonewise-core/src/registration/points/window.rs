@@ -2,7 +2,7 @@
 
 use super::noise::noise_m;
 use crate::geometry::{FaceFrame, OutlineParams, RingIndex, outlines, signed_area};
-use nalgebra::{Matrix3, Point2, Point3, Vector3};
+use nalgebra::{Matrix3, Point2, Point3, Vector2, Vector3};
 use std::collections::BTreeMap;
 
 /// Share of a stone's points, at either end of their depths, that does not set how deep the stone reaches:
@@ -31,7 +31,8 @@ pub struct Window {
     noise_m: [f64; 2],
     /// Sources of each epoch's labelled points, with the number of points of each.
     sources: [BTreeMap<u32, usize>; 2],
-    /// Share of the labelled points that lie inside the other epoch's outlines, of the epoch in which it is less.
+    /// Share of the labelled points that lie inside the other epoch's outlines, of the epoch in which it is less, where the
+    /// middles of both epochs' points meet: a motion hides nothing.
     shared: f64,
 }
 
@@ -50,7 +51,8 @@ impl Window {
         let first = Face::new(labelled[0], &face_from_world, &Vector3::zeros())?;
         let second = Face::new(labelled[1], &face_from_world, shift)?;
         let rings = [&first.rings, &second.rings].map(|rings| RingIndex::new(rings));
-        let shared = first.share_in(&rings[1]).min(second.share_in(&rings[0]));
+        let apart = second.middle() - first.middle();
+        let shared = { first.share_in(&rings[1], &apart) }.min(second.share_in(&rings[0], &-apart));
 
         Some(Self {
             face_from_world,
@@ -79,7 +81,7 @@ impl Window {
         self.noise_m
     }
 
-    /// Share of the stone that both epochs show.
+    /// Share of the stone that both epochs show, wherever it moved.
     pub(crate) fn shared(&self) -> f64 {
         self.shared
     }
@@ -154,9 +156,13 @@ impl Face {
         })
     }
 
-    /// Share of its points inside some rings.
-    fn share_in(&self, rings: &RingIndex) -> f64 {
-        let inside = self.flat.iter().filter(|p| rings.contains(p)).count();
+    fn middle(&self) -> Vector2<f64> {
+        self.flat.iter().map(|p| p.coords).sum::<Vector2<f64>>() / self.flat.len().max(1) as f64
+    }
+
+    /// Share of its points inside some rings, if they move by this.
+    fn share_in(&self, rings: &RingIndex, by: &Vector2<f64>) -> f64 {
+        let inside = self.flat.iter().filter(|p| rings.contains(&(*p + by))).count();
         inside as f64 / self.flat.len().max(1) as f64
     }
 }
