@@ -126,6 +126,7 @@ pub fn registration_record() -> RegistrationRecord {
             passed: true,
             remedy: None,
         }],
+        influence: Vec::new(),
     }
 }
 

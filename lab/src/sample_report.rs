@@ -440,6 +440,7 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
         observers: None,
         deformation: None,
         checks: Vec::new(),
+        influence: Vec::new(),
     };
 
     std::fs::write(dir.join(RUN), serde_json::to_string(&run)?)?;

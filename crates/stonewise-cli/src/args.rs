@@ -5,7 +5,7 @@ use clap_complete::Shell;
 use std::fmt::Write;
 use std::path::PathBuf;
 use stonewise::Until;
-use stonewise::experiment::Dimension;
+use stonewise::experiment::{CalibratedSurvey, Dimension};
 
 /// Measures how a masonry dam moves, stone by stone, from point clouds and photos.
 #[derive(Debug, Parser)]
@@ -215,7 +215,9 @@ pub enum TestCommand {
     Split(SplitArgs),
     /// Certify this program on this machine, on simulated walls and your own scans
     #[command(after_help = "Examples:\n  stonewise test certify --out certificate/\n  \
-        stonewise test certify survey/stonewise.toml --seed 7 --out certificate/\n\n\
+        stonewise test certify survey/stonewise.toml --seed 7 --out certificate/\n  \
+        stonewise test certify --calibration --sensor scanner\n  \
+        stonewise test certify plan.toml --calibration\n\n\
         The figures go to stdout. Exit code 3 if one is outside what is allowed.")]
     Certify(CertifyArgs),
     /// Choose parameters: try every combination of a grid against a known motion
@@ -622,17 +624,38 @@ pub struct DesignArgs {
 /// Arguments of `certify`.
 #[derive(Debug, ClapArgs)]
 pub struct CertifyArgs {
-    /// A project, whose first epoch is split into halves (default: simulated walls only).
+    /// A project, whose first epoch is split into halves (default: simulated walls only); with --calibration the plan of
+    /// a survey, as for `design`.
+    #[arg(value_name = "PROJECT|PLAN")]
     pub project: Option<PathBuf>,
-    /// Folder of certificate.json, certificate.html and the runs; created if missing.
+    /// Folder of certificate.json and .html, or calibration.json and .html, and of the runs; created if missing.
     #[arg(long, value_name = "DIR", default_value = "certificate")]
     pub out: PathBuf,
     /// Seed of the simulated walls and of the halves.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Number of simulated walls; every second one stands still.
-    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    /// Number of simulated walls, of which every second one stands still; with --calibration 50 for each sensor.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 6,
+        default_value_if("calibration", "true", "50"),
+        value_parser = clap::value_parser!(u64).range(1..=1000)
+    )]
     pub walls: u64,
+    /// Draw the motions of the walls from the prior of the method, and test how the truth ranks in what the program
+    /// states.
+    #[arg(long)]
+    pub calibration: bool,
+    /// Only this sensor, instead of all three; may be repeated.
+    #[arg(
+        long,
+        value_name = "NAME",
+        requires = "calibration",
+        conflicts_with = "project",
+        value_parser = CalibratedSurvey::NAMES
+    )]
+    pub sensor: Vec<String>,
 }
 
 /// Which experiment.

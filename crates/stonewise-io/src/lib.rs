@@ -1,5 +1,6 @@
 //! Readers and writers of the formats that surveys come in and results go out: point clouds, posed photos,
-//! masks, tables, and layers for GIS.
+//! masks, tables, adjusted networks, layers for GIS, and drawings
+//! for CAD.
 //!
 //! M3C2 of two clouds, of whichever [format](cloud::CloudFormat):
 //!
@@ -50,12 +51,14 @@ pub mod atomic;
 pub mod cameras;
 pub mod cloud;
 pub mod crs;
+pub mod dxf;
 pub mod exif;
 mod folder;
 pub mod image_io;
 pub mod layers;
 pub mod masks;
 pub mod mesh_ply;
+pub mod network;
 mod photo_name;
 pub mod table;
 pub mod text;

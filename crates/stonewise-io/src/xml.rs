@@ -94,10 +94,14 @@ impl<'a> Element<'a> {
             .collect()
     }
 
+    /// Its line, counted from 1.
+    pub fn line(self) -> usize {
+        self.0.document().text_pos_at(self.0.range().start).row as usize
+    }
+
     /// "<name> in line n".
     pub fn place(self) -> String {
-        let line = self.0.document().text_pos_at(self.0.range().start).row;
-        format!("<{}> in line {line}", self.name())
+        format!("<{}> in line {}", self.name(), self.line())
     }
 }
 

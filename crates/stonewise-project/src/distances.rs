@@ -1,11 +1,13 @@
 //! Known lengths, each an observation of the scale of an epoch.
 
 use crate::instruments::InstrumentFile;
+use crate::networks::NetworkFile;
 use crate::project_type::{Distance, Epoch};
 use nalgebra::Point3;
 use schemars::JsonSchema;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::{Error, Result};
@@ -74,6 +76,21 @@ pub(crate) fn read_raw<'de, D: Deserializer<'de>>(
     }
 }
 
+/// Places by name.
+pub(crate) type Targets<'a> = BTreeMap<&'a str, Point3<f64>>;
+
+/// Where other instruments are; of two of one name, the first.
+pub(crate) fn targets<'a>(instruments: &'a [InstrumentFile], networks: &'a [NetworkFile]) -> Targets<'a> {
+    let instruments = instruments.iter().flat_map(|file| &file.instruments);
+    let points = networks.iter().flat_map(|n| &n.network.points);
+    let instruments = instruments.map(|i| (i.name.as_str(), i.place));
+    let mut targets = Targets::new();
+    for (name, place) in instruments.chain(points.map(|p| (p.name.as_str(), p.place))) {
+        targets.entry(name).or_insert(place);
+    }
+    targets
+}
+
 /// The lengths of a project, whose file is at `project`. `line`: of a table by its number, or of the one that names a file.
 ///
 /// # Errors
@@ -84,10 +101,10 @@ pub(crate) fn distances(
     project: &Path,
     line: impl Fn(Option<usize>) -> usize,
     epochs: &[Epoch],
-    instruments: &[InstrumentFile],
+    targets: &Targets,
 ) -> Result<Vec<Distance>> {
     let find = |raw: &RawDistance, stated: (PathBuf, usize)| {
-        raw.find(epochs, instruments)
+        raw.find(epochs, targets)
             .map_err(|message| Error::Project {
                 path: stated.0.clone(),
                 line: stated.1,
@@ -162,11 +179,7 @@ impl RawDistance {
     }
 
     /// The length with its epoch and ends, or what is wrong with it.
-    fn find(
-        &self,
-        epochs: &[Epoch],
-        instruments: &[InstrumentFile],
-    ) -> std::result::Result<Distance, String> {
+    fn find(&self, epochs: &[Epoch], targets: &Targets) -> std::result::Result<Distance, String> {
         let Some(epoch) = epochs.iter().position(|e| e.name == self.epoch) else {
             let names: Vec<&str> = epochs.iter().map(|e| e.name.as_str()).collect();
             return Err(format!("epoch must name an epoch: {}", names.join(", ")));
@@ -177,7 +190,7 @@ impl RawDistance {
         if !(self.sd_m.is_finite() && self.sd_m >= 0.0) {
             return Err("sd_m must be a number, 0 or more".to_owned());
         }
-        let ends = [self.from.place(instruments)?, self.to.place(instruments)?];
+        let ends = [self.from.place(targets)?, self.to.place(targets)?];
         let found_m = (ends[1] - ends[0]).norm();
         if (found_m / self.length_m - 1.0).abs() > LARGEST_SHARE {
             return Err(format!(
@@ -196,23 +209,19 @@ impl RawDistance {
 }
 
 impl End {
-    fn place(&self, instruments: &[InstrumentFile]) -> std::result::Result<Point3<f64>, String> {
+    fn place(&self, targets: &Targets) -> std::result::Result<Point3<f64>, String> {
         match self {
             Self::Place(place) if place.iter().all(|v| v.is_finite()) => Ok(Point3::from(*place)),
             Self::Place(_) => Err("the coordinates of an end must be finite".to_owned()),
-            Self::Target(name) => {
-                let targets = || instruments.iter().flat_map(|file| &file.instruments);
-                let found = targets().find(|target| target.name == *name);
-                found.map(|target| target.place).ok_or_else(|| {
-                    let names: Vec<&str> = targets().map(|t| t.name.as_str()).collect();
-                    match names.is_empty() {
-                        true => {
-                            format!("{name:?} is no target: give three coordinates, or add [[instruments]]")
-                        }
-                        false => format!("{name:?} is no target; there are {}", names.join(", ")),
+            Self::Target(name) => targets.get(name.as_str()).copied().ok_or_else(|| {
+                let names: Vec<&str> = targets.keys().copied().collect();
+                match names.is_empty() {
+                    true => {
+                        format!("{name:?} is no target: give three coordinates, or add [[instruments]]")
                     }
-                })
-            }
+                    false => format!("{name:?} is no target; there are {}", names.join(", ")),
+                }
+            }),
         }
     }
 }

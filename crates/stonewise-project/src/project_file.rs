@@ -2,9 +2,10 @@
 
 use super::{Epoch, Origin, PhotoChoice, PhotoFiles, Project};
 use crate::conditions::ConditionsFile;
-use crate::distances::{RawDistances, distances, read_raw};
+use crate::distances::{RawDistances, distances, read_raw, targets};
 use crate::edits::EditsFile;
 use crate::instruments::InstrumentFile;
+use crate::networks::{NetworkFile, check_networks};
 use crate::sources::SourceRule;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -30,6 +31,7 @@ use stonewise_core::transfer::{CarryParams, StoneParams, TransferParams};
 use stonewise_core::views::ViewParams;
 use stonewise_io::cameras::MapFrame;
 use stonewise_io::crs::{Geoid, MapSystem};
+use stonewise_io::network::read_network;
 use stonewise_io::text::as_stored;
 use stonewise_segment::Weights;
 use toml::Spanned;
@@ -102,12 +104,19 @@ pub(super) struct RawProject {
 struct RawInstruments {
     /// A CSV file with the columns name, x, y, z, date, dx, dy, dz, sd_x, sd_y, sd_z, metres; a cell is empty where
     /// nothing was measured.
-    #[schemars(with = "PathBuf")]
-    file: Spanned<PathBuf>,
-    /// Whether the instruments are observations of the datum of each later epoch.
+    #[schemars(with = "Option<PathBuf>")]
+    file: Option<Spanned<PathBuf>>,
+    /// In place of `file`: an adjusted network of one epoch with its covariance, the XML of gama-local, the .info of JAG3D
+    /// or a CSV file.
+    #[schemars(with = "Option<PathBuf>")]
+    network: Option<Spanned<PathBuf>>,
+    /// Name of the epoch whose coordinates `network` has.
+    #[schemars(with = "Option<String>")]
+    epoch: Option<Spanned<String>>,
+    /// Whether the instruments are observations of the datum: of each later epoch, or that of `network`.
     #[serde(default, rename = "use")]
     is_used: bool,
-    /// Longest time between two readings that is interpolated, days. Nothing is extrapolated.
+    /// Longest time between two readings of `file` that is interpolated, days. Nothing is extrapolated.
     #[serde(default = "longest_gap_of_instruments_days")]
     #[schemars(with = "f64", range(min = 0))]
     longest_gap_days: Spanned<f64>,
@@ -306,22 +315,18 @@ impl Project {
         if let Some(file) = &conditions {
             notes.extend(add_conditions(file, &mut epochs));
         }
-        let instruments = raw.instruments.into_iter().map(|i| source.instruments(i));
-        let instruments: Vec<InstrumentFile> = instruments.collect::<Result<_>>()?;
         if let Some(name) = &raw.project.reference {
             notes.extend(source.put_reference_first(name, &mut epochs)?);
         }
+        let (instruments, networks) = source.instruments(raw.instruments, &epochs)?;
         let line = |number: Option<usize>| {
             let key = number.map_or_else(|| "distances".to_owned(), |k| format!("distances.{k}"));
-            text.get(..source.place(&key).start)
-                .unwrap_or("")
-                .matches('\n')
-                .count()
-                + 1
+            source.line(source.place(&key))
         };
+        let targets = targets(&instruments, &networks);
         let distances = raw
             .distances
-            .map(|raw| distances(raw, path, line, &epochs, &instruments));
+            .map(|raw| distances(raw, path, line, &epochs, &targets));
         let distances = distances.transpose()?.unwrap_or_default();
         let edits = raw.edits.map(|edits| source.edits(edits, &epochs)).transpose()?;
         Ok(Self {
@@ -333,6 +338,7 @@ impl Project {
             edits,
             conditions,
             instruments,
+            networks,
             distances,
             part: None,
         })
@@ -372,6 +378,11 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
+    /// The line of a place, counted from 1.
+    fn line(&self, span: Range<usize>) -> usize {
+        self.text.get(..span.start).unwrap_or("").matches('\n').count() + 1
+    }
+
     fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
         Error::in_text(self.path, self.text, span.start, message.into())
     }
@@ -527,11 +538,49 @@ impl Source<'_> {
         ConditionsFile::read(&self.existing(raw.file)?, days)
     }
 
-    /// Other instruments, whose file is likewise read at once.
-    fn instruments(&self, raw: RawInstruments) -> Result<InstrumentFile> {
-        let days = self.not_negative(&raw.longest_gap_days, "instruments.longest_gap_days")?;
-        let reach_m = self.not_negative(&raw.reach_m, "instruments.reach_m")?;
-        InstrumentFile::read(&self.existing(raw.file)?, raw.is_used, days, reach_m)
+    /// Other instruments, whose files are likewise read at once.
+    fn instruments(
+        &self,
+        raw: Vec<RawInstruments>,
+        epochs: &[Epoch],
+    ) -> Result<(Vec<InstrumentFile>, Vec<NetworkFile>)> {
+        let (mut files, mut networks) = (Vec::new(), Vec::new());
+        let names: Vec<&str> = epochs.iter().map(|e| e.name.as_str()).collect();
+        for (k, raw) in raw.into_iter().enumerate() {
+            let days = self.not_negative(&raw.longest_gap_days, "instruments.longest_gap_days")?;
+            let reach_m = self.not_negative(&raw.reach_m, "instruments.reach_m")?;
+            match (raw.file, raw.network, raw.epoch) {
+                (Some(file), None, None) => {
+                    let path = self.existing(file)?;
+                    files.push(InstrumentFile::read(&path, raw.is_used, days, reach_m)?);
+                }
+                (None, Some(network), Some(epoch)) => {
+                    let line = self.line(network.span());
+                    let found = names.iter().position(|name| name == epoch.get_ref());
+                    let epoch = found.map(EpochId::at).ok_or_else(|| {
+                        let message = format!("epoch must name an epoch: {}", names.join(", "));
+                        self.error(epoch.span(), message)
+                    })?;
+                    networks.push(NetworkFile {
+                        epoch,
+                        is_used: raw.is_used,
+                        reach_m,
+                        network: read_network(&self.existing(network)?).map_err(|e| Error::Project {
+                            path: e.path,
+                            line: e.line,
+                            message: e.message,
+                        })?,
+                        stated: (self.path.to_path_buf(), line),
+                    });
+                }
+                _ => {
+                    let message = "a table of instruments needs `file`, or `network` with the `epoch` whose coordinates it has";
+                    return Err(self.error(self.place(&format!("instruments.{k}")), message));
+                }
+            }
+        }
+        check_networks(&networks, &names)?;
+        Ok((files, networks))
     }
 
     fn not_negative(&self, value: &Spanned<f64>, key: &str) -> Result<f64> {
@@ -728,7 +777,9 @@ mod tests {
         }
         let targets = "name,x,y,z,date,dx,sd_x\nT1,1,2,3,2025-04-02,0,0.001\n";
         fs::write(dir.path().join("targets.csv"), targets).unwrap();
-        fs::write(dir.path().join("wrong.csv"), "name,x,y,z,date\n").unwrap();
+        fs::write(dir.path().join("wrong.csv"), "name,x,y,z,date\nT1,1,2,3,\n").unwrap();
+        fs::write(dir.path().join("net.csv"), "name,x,y,z\nT1,1,2,3\n").unwrap();
+        fs::write(dir.path().join("net.cov"), "1e-8\n0 1e-8\n0 0 1e-8\n").unwrap();
         let file = dir.path().join("stonewise.toml");
         let read = |tables: &str| {
             let text = format!(
@@ -751,6 +802,13 @@ mod tests {
                 .count(),
             2
         );
+        let network = "[[instruments]]\nnetwork = \"net.csv\"\nepoch =";
+        let project = read(&format!("{table}{network} \"b\"\nuse = true\n{network} \"a\"\n")).unwrap();
+        let epochs: Vec<(usize, bool)> = { project.networks.iter() }
+            .map(|n| (n.epoch.index(), n.is_used))
+            .collect();
+        assert_eq!(epochs, [(1, true), (0, false)]);
+        assert!(project.inputs().iter().any(|p| p.ends_with("net.cov")));
         for (tables, message) in [
             (
                 "[[instruments]]\nfile = \"none.csv\"\n",
@@ -759,6 +817,22 @@ mod tests {
             (
                 "[[instruments]]\nfile = \"wrong.csv\"\n",
                 "wrong.csv:1: nothing is measured",
+            ),
+            (
+                "[[instruments]]\nuse = true\n",
+                "stonewise.toml:9: a table of instruments needs `file`, or `network` with the `epoch`",
+            ),
+            (
+                "[[instruments]]\nnetwork = \"net.csv\"\nepoch = \"c\"\n",
+                "stonewise.toml:11: epoch must name an epoch: a, b",
+            ),
+            (
+                "[[instruments]]\nnetwork = \"wrong.csv\"\nepoch = \"a\"\n",
+                "wrong.cov:1: cannot be read",
+            ),
+            (
+                "[[instruments]]\nnetwork = \"net.csv\"\nepoch = \"b\"\n",
+                "stonewise.toml:10: motions count from the reference",
             ),
             (
                 &*format!("{table}reach_m = -1\n"),

@@ -3,6 +3,7 @@
 use crate::conditions::ConditionsFile;
 use crate::edits::EditsFile;
 use crate::instruments::InstrumentFile;
+use crate::networks::NetworkFile;
 use crate::sources::SourceRule;
 use nalgebra::Point3;
 use schemars::JsonSchema;
@@ -42,6 +43,8 @@ pub struct Project {
     pub conditions: Option<ConditionsFile>,
     /// Files of other instruments.
     pub instruments: Vec<InstrumentFile>,
+    /// Adjusted networks, one for an epoch at most.
+    pub networks: Vec<NetworkFile>,
     /// Known lengths.
     pub distances: Vec<Distance>,
     /// Which points take part; all where absent. No key of the file: commands set it.
@@ -198,8 +201,20 @@ impl Project {
         inputs.extend(Profile::shipped(profile).is_none().then(|| profile.clone()));
         inputs.extend(self.edits.as_ref().map(|edits| edits.path.clone()));
         inputs.extend(self.conditions.as_ref().map(|file| file.path.clone()));
-        inputs.extend(self.instruments.iter().map(|file| file.path.clone()));
+        inputs.extend(self.instrument_files().map(Path::to_path_buf));
         inputs
+    }
+
+    /// The files of other instruments.
+    pub fn instrument_files(&self) -> impl Iterator<Item = &Path> {
+        let networks = self.networks.iter().flat_map(|n| &n.network.files);
+        let files = self.instruments.iter().map(|file| &file.path);
+        files.chain(networks).map(PathBuf::as_path)
+    }
+
+    /// The adjusted network of an epoch.
+    pub fn network(&self, epoch: EpochId) -> Option<&NetworkFile> {
+        self.networks.iter().find(|n| n.epoch == epoch)
     }
 
     /// Whether the stones themselves bring an epoch to the frame of the reference.
@@ -249,6 +264,7 @@ impl Project {
             edits: None,
             conditions: None,
             instruments: Vec::new(),
+            networks: Vec::new(),
             distances: Vec::new(),
             part: None,
         }

@@ -33,6 +33,7 @@ pub(crate) struct Texts {
     pub charts: ChartTexts,
     pub accuracy: AccuracyTexts,
     pub checks: CheckTexts,
+    pub influence: InfluenceTexts,
     pub scores: ScoreTexts,
     pub method: MethodTexts,
     pub audit: AuditTexts,
@@ -160,6 +161,11 @@ groups! {
     /// The checks of the run.
     CheckTexts {
         heading, intro, check, epoch, value, limit, source, outcome, at_least, at_most, passed, failed
+    }
+
+    /// What the results rest on.
+    InfluenceTexts {
+        heading, intro, name, redundancy, blunder, without, shift
     }
 
     /// The score against a known motion.

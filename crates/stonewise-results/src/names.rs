@@ -42,6 +42,8 @@ pub const FACES_VTP: &str = "data/stones.vtp";
 pub const DISPLACEMENTS_VTP: &str = "data/displacements.vtp";
 /// The stones' faces as a coloured mesh.
 pub const FACES_PLY: &str = "data/stones.ply";
+/// The unrolled wall as a drawing for CAD.
+pub const DRAWING: &str = "data/stones.dxf";
 /// The points of stones, coloured by their motion.
 pub const FACE_CLOUD: &str = "data/stones.laz";
 /// Remarks and signature of people; no run writes it.

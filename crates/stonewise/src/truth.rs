@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::fs;
 use std::path::Path;
 use stonewise_core::evaluate::{
-    Evaluation, EvaluationParams, RotationEstimate, StoneOutcome, TrueStone, owned_by_nearest,
+    Evaluation, EvaluationParams, Ranks, RotationEstimate, StoneOutcome, TrueStone, owned_by_nearest,
     score_against_truth, score_neighbours, score_rotations,
 };
 use stonewise_core::id::StoneId;
@@ -40,6 +40,14 @@ pub fn evaluate_truth(results: &Path, truth: &Path, params: &EvaluationParams) -
     evaluation.neighbours = score_neighbours(&outcomes, &stones, &set.neighbours, params);
     write_readable_json(&results.join(EVALUATION_TRUTH), &evaluation)?;
     Ok(evaluation)
+}
+
+/// Ranks of true stones in what a finished run states of them; `truth` as in [`evaluate_truth`].
+pub(crate) fn ranks_of_truth(results: &Path, truth: &Path, params: &EvaluationParams) -> Result<Ranks> {
+    let set = ResultSet::read(results)?;
+    let stones = read_truth(truth)?;
+    let outcomes = owned_by_nearest(outcomes(&set), &stones, params);
+    Ok(Ranks::of(&outcomes, &stones, &set.neighbours, params))
 }
 
 /// The stones of a run as the evaluation takes them.

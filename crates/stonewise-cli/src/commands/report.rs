@@ -16,7 +16,7 @@ pub fn report(args: &ReportArgs, force: bool, printer: &Printer) -> Result<Outco
     stonewise::export::write_layers(&args.results)?;
     folder.note_made_anew()?;
     printer.log(&format!(
-        "wrote {}, stones.gpkg, and stones.geo.parquet, stones.vtp and stones.ply in {DATA_DIR}",
+        "wrote {}, stones.gpkg, and stones.geo.parquet, stones.vtp, stones.ply and stones.dxf in {DATA_DIR}",
         args.results.join(PairFile::ReportPage.place(1)).display()
     ));
     if let Some(pdf) = &pdf {

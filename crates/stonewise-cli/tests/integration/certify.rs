@@ -1,4 +1,4 @@
-//! `certify`: the figures of one simulated wall and of a survey of the user's own.
+//! `certify`: the figures of one simulated wall and of a survey of the user's own; ranks of drawn walls.
 
 use crate::support::{stonewise, survey};
 use serde_json::Value;
@@ -46,4 +46,36 @@ fn a_certificate_has_all_parts_and_goes_on_where_it_stopped() {
     assert_eq!(again["figures"], certificate["figures"]);
     let page = fs::read_to_string(dir.path().join("certificate/certificate.html")).unwrap();
     assert!(page.contains("Simulated walls") && page.contains("own scans"));
+}
+
+#[test]
+#[ignore = "a minute: .ci/nightly runs it"]
+fn a_calibration_ranks_one_stone_of_each_wall_and_goes_on_where_it_stopped() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("certificate");
+    let calibrate = || {
+        let mut command = stonewise();
+        let words = "test certify --calibration --sensor scanner --walls 2 --seed 4 --quiet --out";
+        let output = command.args(words.split(' ')).arg(&out).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        fs::read(out.join("calibration.json")).unwrap_or_else(|e| panic!("{e}: {text}"))
+    };
+    let first = calibrate();
+    let calibration: Value = serde_json::from_slice(&first).unwrap();
+    let rows = calibration["rows"].as_array().unwrap();
+    let counted = |row: &Value| {
+        let counts = row["counts"].as_array().unwrap().iter();
+        counts.map(|c| c.as_u64().unwrap()).sum::<u64>()
+    };
+    assert!(
+        rows.len() >= 6 && rows.iter().all(|row| counted(row) == 2),
+        "{rows:?}"
+    );
+    // One of the walls is drawn again.
+    let wall = fs::read_dir(out.join("work/calibration"))
+        .unwrap()
+        .next()
+        .unwrap();
+    fs::remove_dir_all(wall.unwrap().path()).unwrap();
+    assert_eq!(calibrate(), first);
 }

@@ -63,6 +63,10 @@ fn project(dir: &Path) -> Point3<f64> {
             &date[..7]
         );
     }
+    for date in &dates[1..3] {
+        let epoch = &date[..7];
+        text += &format!("[[instruments]]\nnetwork = \"network.csv\"\nepoch = \"{epoch}\"\nuse = true\n");
+    }
     fs::write(dir.join("stonewise.toml"), text).unwrap();
     let levels = "date,level_m\n2019-09-30,10\n2019-10-02,12\n2020-04-01,8\n2020-10-01,14\n2021-04-01,9\n";
     fs::write(dir.join("levels.csv"), levels).unwrap();
@@ -75,6 +79,18 @@ fn project(dir: &Path) -> Point3<f64> {
         }
     }
     fs::write(dir.join("targets.csv"), targets).unwrap();
+    // The reference and the third epoch as a network, with a pillar off the wall.
+    let mut network = "name,x,y,z\npillar,50,0,0\n".to_owned();
+    for (i, [y, z]) in places.iter().enumerate() {
+        network += &format!("N{i},0,{y},{z}\n");
+    }
+    let covariance = |row: usize| "0 ".repeat(row) + "9e-8\n";
+    fs::write(dir.join("network.csv"), network).unwrap();
+    fs::write(
+        dir.join("network.cov"),
+        (0..18).map(covariance).collect::<String>(),
+    )
+    .unwrap();
     hide(&dir.join("s0"), &dir.join("s0/epoch2/cloud_tls.laz"))
 }
 
@@ -205,10 +221,9 @@ fn a_series_has_its_tables_its_answers_and_its_section() {
 fn check_instruments(found: &Value, record: &Value) {
     let epochs = found["epochs"].as_array().unwrap();
     assert_eq!(epochs.len(), 3);
-    for epoch in epochs {
+    for (epoch, count) in epochs.iter().zip([5, 10, 4]) {
         let compared = epoch["compared"].as_array().unwrap();
-        let is_newest = epoch["epoch"] == "2021-04";
-        assert_eq!(compared.len(), if is_newest { 4 } else { 5 });
+        assert_eq!(compared.len(), count);
         assert!(
             compared
                 .iter()
@@ -218,6 +233,8 @@ fn check_instruments(found: &Value, record: &Value) {
         assert_eq!(epoch["datum"], "observed");
         assert_eq!(record["datum"][epoch["epoch"].as_str().unwrap()], "instruments");
     }
+    assert_eq!(epochs[1]["left_out"][0]["name"], "pillar");
+    assert_eq!(epochs[1]["left_out"][0]["code"], "no_stones");
     assert_eq!(epochs[2]["left_out"][0]["name"], "T4");
     assert_eq!(epochs[2]["left_out"][0]["code"], "after_readings");
 }

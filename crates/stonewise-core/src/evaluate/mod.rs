@@ -10,6 +10,7 @@ mod external_truth;
 mod labels;
 mod motion_field;
 mod neighbours;
+mod ranks;
 mod rotations;
 mod sample;
 mod score;
@@ -23,6 +24,7 @@ pub use external_truth::{Owned, TrueStone, TruthScore, owned_by_nearest, score_a
 pub use labels::{LabelConfusion, LabelScore};
 pub use motion_field::{MotionField, MotionFieldError};
 pub use neighbours::{NeighbourScore, score_neighbours};
+pub use ranks::{RankTest, Ranks};
 pub use rotations::{RotationAxes, RotationScore, RotationStatistics, score_rotations};
 pub use sample::{EvaluationParams, MotionSample, RotationEstimate, StoneOutcome};
 pub use score::{Directions, MotionScore, score_change, score_motions, score_stones};

@@ -29,24 +29,34 @@ pub fn score_neighbours(
     neighbours: &[NeighbourCovariance],
     params: &EvaluationParams,
 ) -> Option<NeighbourScore> {
+    let samples = samples(outcomes, stones, neighbours, params);
+    (!samples.is_empty()).then(|| NeighbourScore {
+        pairs: samples.len(),
+        errors: directions(&samples, params.outlier_m),
+        calibration: Calibration::of(&MotionSample::claims(&samples)),
+    })
+}
+
+/// The differences between neighbours whose true stones are countable, beside the truth.
+pub(super) fn samples(
+    outcomes: &[Owned],
+    stones: &[TrueStone],
+    neighbours: &[NeighbourCovariance],
+    params: &EvaluationParams,
+) -> Vec<MotionSample> {
     let true_stones: BTreeMap<StoneId, &TrueStone> = stones.iter().map(|s| (s.stone_id, s)).collect();
     let known: BTreeMap<StoneId, (&StoneOutcome, &TrueStone)> = outcomes
         .iter()
         .filter_map(|(outcome, owner)| Some((outcome.stone, (outcome, *true_stones.get(&(*owner)?)?))))
         .filter(|(_, (_, stone))| stone.is_countable(params))
         .collect();
-    let samples: Vec<MotionSample> = neighbours
+    neighbours
         .iter()
         .filter_map(|pair| {
             let [first, second] = pair.stones.map(|id| known.get(&id));
             sample(&pair.covariance, [*first?, *second?])
         })
-        .collect();
-    (!samples.is_empty()).then(|| NeighbourScore {
-        pairs: samples.len(),
-        errors: directions(&samples, params.outlier_m),
-        calibration: Calibration::of(&MotionSample::claims(&samples)),
-    })
+        .collect()
 }
 
 fn sample(

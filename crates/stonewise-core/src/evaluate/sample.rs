@@ -119,7 +119,7 @@ pub struct MotionSample {
 }
 
 /// Half-width of a 95 % interval of the normal distribution, in standard deviations.
-const Z95: f64 = 1.959_963_984_540_054;
+pub(super) const Z95: f64 = 1.959_963_984_540_054;
 
 impl MotionSample {
     /// A stone's motion beside the truth at its centroid; `None` where the stone has no estimate.

@@ -16,8 +16,9 @@ pub(crate) mod points;
 mod random;
 
 pub use adjustment::{
-    AdjustError, AdjustmentParams, AdjustmentReport, Break, FaceShift, JointMotions, PhotoReport, PhotoShift,
-    StoneEvidence, StonePhotoReport, VarianceComponents, adjust, adjust_with_photos,
+    AdjustError, AdjustmentParams, AdjustmentReport, Break, DrawnMotion, FaceShift, JointMotions,
+    PhotoReport, PhotoShift, StoneEvidence, StonePhotoReport, VarianceComponents, adjust, adjust_with_photos,
+    draw_motions,
 };
 pub use deformation::{
     Against, Deformation, DeformationZone, StoneDeformation, ZONE_EXTENTS_M, ZoneKind, deformation,

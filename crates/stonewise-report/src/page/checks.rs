@@ -2,12 +2,13 @@
 
 use super::first_page::with_code;
 use super::html::{section, table};
+use super::influence::influence;
 use crate::texts::{Texts, fill};
 use stonewise_figure::escape;
 use stonewise_results::ResultSet;
 use stonewise_results::records::CheckRecord;
 
-/// The table of the checks; empty where none is recorded.
+/// The tables of the checks and of what the results rest on; empty where none is recorded.
 pub(super) fn checks(results: &ResultSet, texts: &Texts) -> String {
     let checks = results
         .registration
@@ -23,13 +24,13 @@ pub(super) fn checks(results: &ResultSet, texts: &Texts) -> String {
         names.source,
         names.outcome,
     ];
-    match rows.is_empty() {
+    let checks = match rows.is_empty() {
         true => String::new(),
-        false => section(
-            "checks",
-            names.heading,
-            &format!("<p>{}</p>{}", names.intro, table(&head, &rows, head.len())),
-        ),
+        false => format!("<p>{}</p>{}", names.intro, table(&head, &rows, head.len())),
+    };
+    match checks + &influence(results, texts) {
+        body if body.is_empty() => body,
+        body => section("checks", names.heading, &body),
     }
 }
 

@@ -12,6 +12,7 @@ mod excerpts;
 mod explorer;
 mod first_page;
 mod html;
+mod influence;
 mod instruments;
 mod look_first;
 mod maps;

@@ -173,7 +173,7 @@ fn motion_table(moved: &[(&StoneRow, &RowMotion)], factor: f64) -> Result<Table,
 }
 
 /// How much longer lines are drawn: large motions reach about two stones far; 1, 2 or 5 times a power of ten.
-fn exaggeration(results: &ResultSet, measured: &[(&StoneRow, &RowMotion)]) -> f64 {
+pub(super) fn exaggeration(results: &ResultSet, measured: &[(&StoneRow, &RowMotion)]) -> f64 {
     let sizes = Sorted::new(results.stones.iter().map(|s| s.area_m2.max(0.0).sqrt()));
     let motions = Sorted::new(measured.iter().map(|(_, m)| m.displacement.norm()));
     let (size, motion) = (

@@ -1,5 +1,6 @@
-//! Results as layers for the tools that engineers already use: QGIS, ParaView, CloudCompare.
+//! Results as layers for the tools that engineers already use: QGIS, ParaView, CloudCompare, CAD.
 
+mod drawing;
 mod face_colours;
 mod face_mesh;
 mod joint_layer;

@@ -1,27 +1,30 @@
 //! Writes every layer from result files.
 
+use super::drawing::draw;
 use super::face_mesh::face_mesh;
 use super::layers::layers;
 use super::polygons::{centroids, face_polygons};
 use crate::ResultSet;
-use crate::names::{DISPLACEMENTS_VTP, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET};
+use crate::names::{DISPLACEMENTS_VTP, DRAWING, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET};
 use crate::records::Timestamp;
 use std::path::Path;
 use stonewise_base::error::Error;
+use stonewise_io::dxf::{Drawing, write_dxf};
 use stonewise_io::layers::{write_geopackage, write_geoparquet, write_vtp};
 use stonewise_io::mesh_ply::write_coloured_mesh;
 
-/// Makes `stones.gpkg`, and in `data` `stones.geo.parquet`, `stones.vtp`, `displacements.vtp` and `stones.ply`,
-/// from the result files in `dir`.
+/// Makes `stones.gpkg`, and in `data` `stones.geo.parquet`, `stones.vtp`, `displacements.vtp`, `stones.ply`
+/// and `stones.dxf`, from the result files in `dir`.
 ///
 /// The GeoPackage has the stones in the world frame (`stones`), unrolled (`stones_facade`), their
 /// displacements as exaggerated lines in both (`displacements`, `displacements_facade`), and the joints
 /// between them (`joints`, `joints_facade`), each with styles for QGIS, and, where the wall deformed, the
 /// outlines of the zones (`zones`, `zones_facade`). The VTK files hold the stones as
 /// polygons and their centroids with the displacements as vectors, for ParaView. The PLY is a mesh of the
-/// stones' faces, coloured by the out-of-plane displacement, with all components as scalars. With more than
-/// two epochs, the GeoPackage has the layers of the third against the first as `stones_2` and so on; the
-/// other files are of the second epoch. Its time stamps are the date of the latest survey, else the day on
+/// stones' faces, coloured by the out-of-plane displacement, with all components as scalars. The DXF is
+/// the unrolled wall for CAD, with layers for each epoch and state. With more than two epochs, the GeoPackage has the
+/// layers of the third against the first as `stones_2` and so on, and the DXF has all; the other files are of the second
+/// epoch. Its time stamps are the date of the latest survey, else the day on
 /// which the latest cloud was written, so that the same inputs give the same bytes; 1 January 1970 where
 /// neither is known.
 ///
@@ -30,9 +33,12 @@ use stonewise_io::mesh_ply::write_coloured_mesh;
 pub fn write_layers(dir: &Path) -> Result<(), Error> {
     let results = ResultSet::read(dir)?;
     let mut layers = layers(&results)?;
+    let mut drawing = Drawing::default();
+    draw(&mut drawing, &results);
     for pair in 2..=results.pairs {
         let later = ResultSet::read_pair(dir, pair)?;
         layers.extend(self::layers(&later)?);
+        draw(&mut drawing, &later);
     }
     write_geopackage(&dir.join(GEOPACKAGE), &layers, &surveyed(&results).to_string())?;
     if let Some(world) = layers.first() {
@@ -47,6 +53,8 @@ pub fn write_layers(dir: &Path) -> Result<(), Error> {
     }
     let mesh = dir.join(FACES_PLY);
     write_coloured_mesh(&mesh, &face_mesh(&results)).map_err(Error::io("writing the mesh", &mesh))?;
+    let path = dir.join(DRAWING);
+    write_dxf(&path, &drawing).map_err(Error::io("writing the drawing", &path))?;
     Ok(())
 }
 
@@ -79,6 +87,7 @@ mod tests {
             "data/stones.csv-metadata.json",
             "data/stones.vtp",
             "data/displacements.vtp",
+            "data/stones.dxf",
         ];
         let bytes = || {
             write_layers(folder.path()).unwrap();

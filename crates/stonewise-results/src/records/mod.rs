@@ -15,8 +15,8 @@ pub use instruments::{
     LeftOutInstrument, WhyLeftOut,
 };
 pub use registration::{
-    AdjustmentRecord, CheckRecord, DeformationRecord, EstimatorRecord, GicpRecord, ObserversRecord,
-    PhotosRecord, RegistrationRecord,
+    AdjustmentRecord, CheckRecord, DeformationRecord, EstimatorRecord, GicpRecord, InfluenceRecord,
+    ObserversRecord, PhotosRecord, RegistrationRecord,
 };
 pub use remarks::{Remark, Remarks, Signature, signed_digest};
 pub use run::{CrsRecord, EpochRecord, InputRecord, PhotoScale, ProjectRecord, RunRecord, StepTime};
@@ -65,6 +65,7 @@ mod tests {
             observers: None,
             deformation: None,
             checks: Vec::new(),
+            influence: Vec::new(),
         });
         let params = EvaluationParams::default();
         let mut evaluation = Evaluation::new("the motion in the project file", &params);

@@ -9,6 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use stonewise_core::geometry::Rigid3;
+use stonewise_core::registration::{AdjustmentParams, draw_motions};
 
 /// One cause of motion; a survey has any number of them, and they add up. No entry: nothing moved.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,6 +80,8 @@ pub enum WallMotion {
         /// Standard deviation of the rotation per axis, radians: unlike that of the neighbours.
         rotation_rad: f64,
     },
+    /// What the adjustment assumes of walls beforehand, drawn ([`draw_motions`]); for walls of up to 200 stones.
+    Assumed,
 }
 
 /// What one stone did, with its parts.
@@ -118,6 +121,19 @@ pub fn move_stones(wall: &Wall, motions: &[WallMotion], seed: u64) -> Vec<TrueMo
                     let mut draw = |sd: f64| Vector3::from_fn(|_, _| sd * normal(&mut rng));
                     let (shift, turn) = (draw(shift_m), draw(rotation_rad));
                     motion.second_from_first *= about_middle(stone, shift, turn);
+                }
+            }
+            WallMotion::Assumed => {
+                let place = |s: &SimStone| {
+                    let middle = s.world_from_stone.translation.vector;
+                    (middle.into(), wall.face.frame(s.middle[0]).out)
+                };
+                let places: Vec<_> = wall.stones.iter().map(place).collect();
+                let drawn = draw_motions(&places, &AdjustmentParams::default(), seed).unwrap_or_default();
+                for ((stone, motion), drawn) in wall.stones.iter().zip(&mut moved).zip(drawn) {
+                    motion.second_from_first *= about_middle(stone, drawn.displacement, drawn.rotation);
+                    motion.shared += drawn.shared;
+                    motion.loose |= drawn.loose;
                 }
             }
             _ => {}
@@ -166,7 +182,7 @@ fn displacement(wall: &Wall, motion: &WallMotion, a: f64, u: f64, without_breaks
                 in_world(*d_m)
             }
         }
-        WallMotion::Loose { .. } | WallMotion::Own { .. } => Vector3::zeros(),
+        WallMotion::Loose { .. } | WallMotion::Own { .. } | WallMotion::Assumed => Vector3::zeros(),
     }
 }
 

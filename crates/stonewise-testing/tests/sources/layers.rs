@@ -40,8 +40,8 @@ const IO: Layers = &[
     &["text", "xml"],
     &["atomic", "crs", "exif", "folder", "photo_name", "wall"],
     &["image_io"],
-    &["cameras", "cloud", "mesh_ply", "table"],
-    &["layers", "masks"],
+    &["cameras", "cloud", "dxf", "mesh_ply", "table"],
+    &["layers", "masks", "network"],
 ];
 
 const SEGMENT: Layers = &[
@@ -109,6 +109,7 @@ const REPORT: Layers = &[
 const PROJECT: Layers = &[
     &["dated_csv"],
     &["conditions", "edits", "init", "instruments", "sources"],
+    &["networks"],
     &["project_type"],
     &["distances", "origin"],
     &["check", "project_file", "project_parameters", "split"],

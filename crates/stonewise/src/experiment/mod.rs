@@ -18,7 +18,10 @@ mod tables;
 mod tune;
 
 pub use baseline::Baseline;
-pub use certify::{Certificate, CertifyOptions, Figure, certify};
+pub use certify::{
+    CalibratedSurvey, Calibration, CalibrationOptions, CalibrationRow, Certificate, CertifyOptions, Figure,
+    calibrate, certify,
+};
 pub use design::{Design, design};
 pub use paper::{PaperSurvey, PaperTables, paper};
 pub use simulation::not_simulated;

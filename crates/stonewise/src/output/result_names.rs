@@ -2,8 +2,8 @@
 
 use crate::project::Project;
 use crate::results::names::{
-    DATA_DIR, DISPLACEMENTS_VTP, EVALUATION_TRUTH, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET, WORK_DIR,
-    epoch_dir, is_of_report,
+    DATA_DIR, DISPLACEMENTS_VTP, DRAWING, EVALUATION_TRUTH, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET,
+    WORK_DIR, epoch_dir, is_of_report,
 };
 use std::path::{Path, PathBuf};
 
@@ -49,8 +49,8 @@ const REPORT: [&str; 8] = [
     "observations",
 ];
 /// Their extensions; `csv-metadata.json` is `json`, and earlier versions wrote `geojson`.
-const EXTENSIONS: [&str; 12] = [
-    "csv", "parquet", "json", "geojson", "gpkg", "laz", "vtp", "ply", "html", "jpg", "png", "b3",
+const EXTENSIONS: [&str; 13] = [
+    "csv", "parquet", "json", "geojson", "gpkg", "laz", "vtp", "ply", "dxf", "html", "jpg", "png", "b3",
 ];
 /// Excerpts of the survey, without the numbers of epochs and pictures.
 const EVIDENCE: [&str; 9] = [
@@ -109,7 +109,14 @@ pub(super) fn of_older_layout(file: &Path) -> PathBuf {
 /// Whether a command makes this result anew from others after the run: the report, the layers, and scores
 /// against a truth of the user's.
 pub(super) fn is_made_anew(file: &Path) -> bool {
-    let layers = [GEOPACKAGE, GEOPARQUET, FACES_VTP, DISPLACEMENTS_VTP, FACES_PLY];
+    let layers = [
+        GEOPACKAGE,
+        GEOPARQUET,
+        FACES_VTP,
+        DISPLACEMENTS_VTP,
+        FACES_PLY,
+        DRAWING,
+    ];
     is_of_report(file) || file == EVALUATION_TRUTH || layers.iter().any(|layer| file == *layer)
 }
 

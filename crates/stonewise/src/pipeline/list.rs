@@ -39,6 +39,7 @@ pub static STEPS: &[&Step] = &[
     &steps::tracks::TRACKS,
     &outputs::trends::TRENDS,
     &outputs::verdict::VERDICT,
+    &outputs::influence::INFLUENCE,
     &outputs::evidence::EVIDENCE,
     &outputs::clouds::CLOUDS,
     &outputs::face_cloud::FACE_CLOUD,

@@ -73,9 +73,9 @@ pub(super) fn inputs(run: &RunRecord, project: &Project) -> Result<Vec<Finding>>
     let conditions = project.conditions.as_ref().map(|c| c.path.as_path());
     compare("conditions", run.conditions.as_ref(), conditions)?;
 
-    for i in 0..run.instruments.len().max(project.instruments.len()) {
-        let path = project.instruments.get(i).map(|file| file.path.as_path());
-        compare("instruments", run.instruments.get(i), path)?;
+    let instruments: Vec<&Path> = project.instrument_files().collect();
+    for i in 0..run.instruments.len().max(instruments.len()) {
+        compare("instruments", run.instruments.get(i), instruments.get(i).copied())?;
     }
 
     let message = format!("{agree} inputs are those of the run");

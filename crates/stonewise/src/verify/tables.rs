@@ -10,7 +10,7 @@ use crate::output::named_results_in;
 use crate::pipeline::verdict_of_tables;
 use crate::report::write_report;
 use crate::results::names::{
-    DISPLACEMENTS_VTP, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET, PairFile, RUN, SERIES, VERDICT,
+    DISPLACEMENTS_VTP, DRAWING, FACES_PLY, FACES_VTP, GEOPACKAGE, GEOPARQUET, PairFile, RUN, SERIES, VERDICT,
     is_of_report,
 };
 use crate::results::records::{EpochRecord, RunRecord};
@@ -129,7 +129,13 @@ fn verdict(results: &Path, run: &RunRecord, progress: &dyn Progress) -> Compared
         .iter()
         .map(|e| (e.name.as_str(), e.date.as_deref()))
         .collect();
-    let verdict = verdict_of_tables(results, &epochs, &run.warnings, &run.parameters, progress)?;
+    let verdict = verdict_of_tables(
+        results,
+        &epochs,
+        &run.warnings,
+        &run.parameters,
+        (progress, &|_, _| ()),
+    )?;
     let found: Value = read_json(&results.join(VERDICT))?;
     let headlines = [json(&run.verdict), json(&Some(verdict.headlines()))];
     if let Some(difference) = first_difference(&headlines[0], &headlines[1], &|_| Tolerance::ROUNDING) {
@@ -187,7 +193,17 @@ fn made_again(results: &Path, run: &RunRecord) -> Result<Vec<Finding>> {
     if files.is_empty() {
         return Ok(Vec::new());
     }
-    files.extend([GEOPACKAGE, GEOPARQUET, FACES_VTP, DISPLACEMENTS_VTP, FACES_PLY].map(PathBuf::from));
+    files.extend(
+        [
+            GEOPACKAGE,
+            GEOPARQUET,
+            FACES_VTP,
+            DISPLACEMENTS_VTP,
+            FACES_PLY,
+            DRAWING,
+        ]
+        .map(PathBuf::from),
+    );
     write_report(scratch.path())?;
     write_layers(scratch.path())?;
     let other_maker = Maker::of(run).differs(&Maker::present());

@@ -10,6 +10,7 @@ mod bodies;
 mod breaks;
 mod candidate;
 mod covered;
+mod draw;
 mod equations;
 mod error;
 mod estimate;
@@ -39,6 +40,7 @@ pub(super) mod testing;
 mod tracking;
 
 pub use adjust::{adjust, adjust_with_photos};
+pub use draw::{DrawnMotion, draw_motions};
 pub use error::AdjustError;
 pub use field::VarianceComponents;
 pub use joint_motions::JointMotions;

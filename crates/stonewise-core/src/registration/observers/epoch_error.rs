@@ -7,7 +7,9 @@ use super::components::{ObserverComponents, SensorClass};
 use super::congruence::{reweighted, standing};
 use super::contrast::contrasts;
 use super::cross_check::{CrossCheck, cross_check};
+use super::datum::Datum;
 use super::epoch_pair::{EpochErrorParams, EpochPair, all_sights};
+use super::influence::{Influence, influences};
 use super::joint::JointErrors;
 use super::lone_area::LoneArea;
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
@@ -24,18 +26,6 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal};
-
-/// Where the knowledge of the epochs' common frame comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Datum {
-    /// Areas that did not move.
-    Stable,
-    /// Differences between the sources of each epoch.
-    Sources,
-    /// Nothing shows it.
-    Unknown,
-}
 
 /// Error of the later epoch minus that of the reference at a place, world, metres.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -84,6 +74,9 @@ pub struct EpochErrors {
     /// The stable area that shows an error which nothing else confirms, if there is one.
     #[serde(default)]
     pub lone_area: Option<LoneArea>,
+    /// What each source and each stable area does to the results.
+    #[serde(default)]
+    pub influences: Vec<Influence>,
     /// Per source, in their order.
     pub sources: Vec<SourceError>,
     /// The rigid part of the error over all stones.
@@ -199,13 +192,16 @@ fn of_sources(
 
     let (mut stable, mut moved_areas) = standing(&unknowns, &within, stable, &judging);
     let observations = [within[0].len(), within[1].len(), stable.len()];
-    let datum = if stable.len() >= params.stable.min_cells {
-        Datum::Stable
-    } else if is_significant && !pair.is_aligned {
-        Datum::Sources
-    } else {
-        Datum::Unknown
+    let datum_of = |cells: usize, overlaps: bool| {
+        if cells >= params.stable.min_cells {
+            Datum::Stable
+        } else if overlaps && is_significant && !pair.is_aligned {
+            Datum::Sources
+        } else {
+            Datum::Unknown
+        }
     };
+    let datum = datum_of(stable.len(), overlaps);
 
     if datum != Datum::Stable {
         stable.clear();
@@ -224,6 +220,17 @@ fn of_sources(
     let rows = rigid_rows(pair, &unknowns);
     let rigid = rows.error(&found.weighted());
     let lone_area = LoneArea::among(&stable, &within, &unknowns, &assumed, &rows, &rigid);
+    let datum_of = |rest: &[&Observation]| {
+        let cells = rest.iter().filter(|o| o.plane().is_some()).count();
+        let compares = |e: usize| {
+            let mut of_stones = rest.iter().filter(|o| o.plane().is_none());
+            of_stones.any(|o| pair.sources[o.sights[0].source].epoch == e)
+        };
+        datum_of(cells, (0..2).all(compares))
+    };
+    progress.check()?;
+    let sizes = (&model, components.translation_m);
+    let influences = influences(pair, &unknowns, &reweighted, sizes, datum_of);
     let relative = match datum {
         Datum::Unknown => relative_errors(pair, &within, &components, class, params),
         Datum::Stable | Datum::Sources => None,
@@ -259,6 +266,7 @@ fn of_sources(
         observations,
         moved_areas,
         lone_area,
+        influences,
         sources: found.sources(pair, &unknowns),
         rigid,
         cross_check,
@@ -277,8 +285,7 @@ fn of_sources(
 fn means_of_motions(pair: &EpochPair, points: &[ErrorAt], rigid: &RigidError) -> Vec<Vector3<f64>> {
     let rigidly: Vec<Vector3<f64>> = pair.stones.iter().map(|s| rigid.at(&s.centroid)).collect();
     let rest: Vec<Vector3<f64>> = points.iter().zip(&rigidly).map(|(p, r)| p.mean - r).collect();
-    let followed = pair.response.as_ref().and_then(|response| response.of(&rest));
-    let followed = followed.unwrap_or(rest);
+    let followed = pair.followed(vec![rest]).concat();
     rigidly.iter().zip(followed).map(|(r, f)| r + f).collect()
 }
 

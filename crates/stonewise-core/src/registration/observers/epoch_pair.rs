@@ -8,6 +8,7 @@ use super::scale::KnownScale;
 use super::sight::{SeenStone, Sight, Source, Target};
 use super::stable::{StableParams, StablePoints};
 use crate::params::{Params, Range, Ranged, with_ranges};
+use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -87,6 +88,12 @@ impl<'a> EpochPair<'a> {
             has_unknown_photos: false,
             scale: None,
         }
+    }
+
+    /// What the motions of the stones follow of these errors of their points, world, metres.
+    pub(super) fn followed(&self, errors: Vec<Vec<Vector3<f64>>>) -> Vec<Vec<Vector3<f64>>> {
+        let response = self.response.as_ref();
+        response.and_then(|r| r.of(&errors)).unwrap_or(errors)
     }
 }
 

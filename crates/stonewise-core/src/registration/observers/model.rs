@@ -399,6 +399,53 @@ impl Solution {
     }
 }
 
+/// Normal equations, and the deviance of what does not depend on the unknowns.
+struct Normal {
+    information: DMatrix<f64>,
+    vector: DVector<f64>,
+    deviance: f64,
+}
+
+impl Normal {
+    /// Adds those of a problem without its prior, times `sign`, each unknown at its `place`.
+    fn add(
+        &mut self,
+        problem: &Problem,
+        components: &ObserverComponents,
+        sign: f64,
+        place: impl Fn(usize) -> usize,
+    ) -> Option<()> {
+        for (observation, indices, design) in &problem.designs {
+            let covariance = observation.covariance(components.noise_scale, components.nugget_m);
+            let factor = Cholesky::new(covariance)?;
+            let scaled = factor.solve(design);
+            let of_values = factor.solve(&observation.values);
+            self.deviance +=
+                2.0 * factor.l_dirty().diagonal().map(f64::ln).sum() + observation.values.dot(&of_values);
+            let block = design.transpose() * scaled;
+            let part = design.transpose() * of_values;
+            let places: Vec<usize> = indices.iter().map(|&unknown| place(unknown)).collect();
+            for (r, &row) in places.iter().enumerate() {
+                self.vector[row] += sign * part[r];
+                for (c, &column) in places.iter().enumerate() {
+                    self.information[(row, column)] += sign * block[(r, c)];
+                }
+            }
+        }
+        Some(())
+    }
+}
+
+/// Normal equations of some observations, without the prior, over the unknowns that they touch.
+pub(super) struct Part {
+    /// Number of differences.
+    pub differences: usize,
+    /// The unknowns, ascending.
+    pub unknowns: Vec<usize>,
+    pub information: DMatrix<f64>,
+    pub vector: DVector<f64>,
+}
+
 /// Observations with the unknowns that they touch.
 pub(super) struct Problem<'a> {
     pub unknowns: &'a Unknowns,
@@ -424,26 +471,38 @@ impl<'a> Problem<'a> {
         prior: &Prior,
         components: &ObserverComponents,
     ) -> Option<(DenseFactor, DVector<f64>, f64)> {
-        let (mut information, prior_log_det) = self.unknowns.prior(prior);
-        let mut vector = DVector::zeros(self.unknowns.count());
-        let mut deviance = -prior_log_det;
-        for (observation, indices, design) in &self.designs {
-            let covariance = observation.covariance(components.noise_scale, components.nugget_m);
-            let factor = Cholesky::new(covariance)?;
-            let scaled = factor.solve(design);
-            let of_values = factor.solve(&observation.values);
-            deviance +=
-                2.0 * factor.l_dirty().diagonal().map(f64::ln).sum() + observation.values.dot(&of_values);
-            let block = design.transpose() * scaled;
-            let part = design.transpose() * of_values;
-            for (r, &row) in indices.iter().enumerate() {
-                vector[row] += part[r];
-                for (c, &column) in indices.iter().enumerate() {
-                    information[(row, column)] += block[(r, c)];
-                }
-            }
+        let (information, prior_log_det) = self.unknowns.prior(prior);
+        let mut sum = Normal {
+            information,
+            vector: DVector::zeros(self.unknowns.count()),
+            deviance: -prior_log_det,
+        };
+        sum.add(self, components, 1.0, |unknown| unknown)?;
+        Some((DenseFactor::of(&sum.information)?, sum.vector, sum.deviance))
+    }
+
+    /// What the observations add to the normal equations beyond those of `rest`, which touch no other unknowns.
+    pub fn beyond(&self, rest: &Self, components: &ObserverComponents) -> Option<Part> {
+        let mut unknowns: Vec<usize> = self.designs.iter().flat_map(|d| d.1.iter().copied()).collect();
+        unknowns.sort_unstable();
+        unknowns.dedup();
+        let count = unknowns.len();
+        let mut sum = Normal {
+            information: DMatrix::zeros(count, count),
+            vector: DVector::zeros(count),
+            deviance: 0.0,
+        };
+        for (problem, sign) in [(self, 1.0), (rest, -1.0)] {
+            let place = |unknown| unknowns.partition_point(|u| *u < unknown);
+            sum.add(problem, components, sign, place)?;
         }
-        Some((DenseFactor::of(&information)?, vector, deviance))
+        let differences = |p: &Self| p.designs.iter().map(|d| d.0.len()).sum::<usize>();
+        Some(Part {
+            differences: differences(self) - differences(rest),
+            unknowns,
+            information: sum.information,
+            vector: sum.vector,
+        })
     }
 
     /// Minus twice the log marginal likelihood, up to a constant; `None` where the numbers fail.

@@ -7,6 +7,7 @@ use crate::id::StoneId;
 use crate::linalg::BlockPattern;
 use crate::registration::adjustment::JointMotions;
 use nalgebra::{SVector, Vector3};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// The last solution of an adjustment, for stones in an order of their own.
@@ -19,31 +20,36 @@ pub struct Response<'a> {
 }
 
 impl Response<'_> {
-    /// What the motions of the stones follow of these errors of their points, world, metres. `None` where memory does not
-    /// suffice.
-    pub(super) fn of(&self, errors: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
+    /// What the motions of the stones follow of these errors of their points, world, metres; several errors share a
+    /// factorisation. `None` where memory does not suffice.
+    pub(super) fn of(&self, errors: &[Vec<Vector3<f64>>]) -> Option<Vec<Vec<Vector3<f64>>>> {
         let motions = self.motions;
         let pattern = BlockPattern::<9>::new(motions.stones.len(), &motions.edges)?;
         let factor = pattern.factor(&motions.information)?;
         let nodes: BTreeMap<StoneId, usize> = motions.pulls.iter().map(|p| p.stone).zip(0..).collect();
         let node_of = |stone: &StoneId| nodes.get(stone).copied();
 
-        let mut right = vec![SVector::<f64, 9>::zeros(); motions.pulls.len()];
-        for (stone, error) in self.stones.iter().zip(errors) {
-            if let Some(node) = node_of(stone) {
-                right[node] += motions.pulls[node].on_field * error;
+        let of_one = |errors: &Vec<Vector3<f64>>| {
+            let mut right = vec![SVector::<f64, 9>::zeros(); motions.pulls.len()];
+            for (stone, error) in self.stones.iter().zip(errors) {
+                if let Some(node) = node_of(stone) {
+                    right[node] += motions.pulls[node].on_field * error;
+                }
             }
-        }
-        let field = factor.solve(&right);
+            let field = factor.solve(&right);
 
-        let followed = |(stone, error): (&StoneId, &Vector3<f64>)| {
-            let measured = node_of(stone).and_then(|node| Some((node, motions.stones[node].as_ref()?)));
-            match measured {
-                Some((node, stone)) => stone.by_field * field[node] + motions.pulls[node].on_stone * error,
-                None => *error,
-            }
+            let followed = |(stone, error): (&StoneId, &Vector3<f64>)| {
+                let measured = node_of(stone).and_then(|node| Some((node, motions.stones[node].as_ref()?)));
+                match measured {
+                    Some((node, stone)) => {
+                        stone.by_field * field[node] + motions.pulls[node].on_stone * error
+                    }
+                    None => *error,
+                }
+            };
+            self.stones.iter().zip(errors).map(followed).collect()
         };
-        Some(self.stones.iter().zip(errors).map(followed).collect())
+        Some(errors.par_iter().map(of_one).collect())
     }
 }
 
@@ -79,7 +85,7 @@ mod tests {
         };
         let error = |k: u32| if errs(k) { shift } else { Vector3::zeros() };
         let errors: Vec<Vector3<f64>> = (0..stones.len() as u32).map(error).collect();
-        let followed = response.of(&errors).unwrap();
+        let followed = response.of(&[errors]).unwrap().concat();
 
         let (mut apart, mut largest): (f64, f64) = (0.0, 0.0);
         for ((before, after), by) in still.results.iter().zip(&moved.results).zip(&followed) {

@@ -1,8 +1,11 @@
 //! The observers' errors, against surveys drawn from their model and against closed forms.
 
+mod influence;
+
 use super::component_estimate::estimate;
 use super::components::{ObserverComponents, SensorClass};
-use super::epoch_error::{Datum, EpochErrors, epoch_errors};
+use super::datum::Datum;
+use super::epoch_error::{EpochErrors, epoch_errors};
 use super::epoch_pair::{EpochErrorParams, EpochPair};
 use super::model::{Prior, Problem, Unknowns};
 use super::observation::Observation;

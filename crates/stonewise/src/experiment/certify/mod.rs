@@ -1,6 +1,7 @@
 //! A certificate: what the program reaches where the truth is simulated or put in, on this machine, with
 //! tolerances stated beforehand.
 
+mod calibration;
 mod certificate;
 mod own;
 mod page;
@@ -12,6 +13,7 @@ use crate::processor_class;
 use crate::results::records::Timestamp;
 use crate::storage::step::code_version;
 use crate::storage::store::{Keeps, StepStore};
+pub use calibration::{CalibratedSurvey, Calibration, CalibrationOptions, CalibrationRow, calibrate};
 pub use certificate::{Certificate, CertifyOptions, Figure};
 use std::path::Path;
 use std::sync::Arc;

@@ -20,7 +20,7 @@ use stonewise_simulate::{
 
 const PART: &str = "walls";
 /// Width and height of a wall, metres.
-const SIZE_M: [f64; 2] = [2.4, 1.6];
+pub(super) const SIZE_M: [f64; 2] = [2.4, 1.6];
 /// A pixel of the photos on the wall, metres: the paper's.
 const PIXEL_M: f64 = 5.4e-3;
 /// Least share of true motions inside intervals that are to hold 95 %: stones of a wall are tied to each other, so
@@ -29,10 +29,10 @@ const LEAST_COVERAGE: f64 = 0.9;
 /// Least share of stones found of those that moved by more than their own limit. At the limit, half are.
 const LEAST_FOUND: f64 = 0.9;
 /// What all stations of an epoch share, metres per axis: as much as is assumed of terrestrial scanners.
-const DATUM_M: f64 = 0.3e-3;
+pub(super) const DATUM_M: f64 = 0.3e-3;
 /// Chance of an alarm on a wall that stands still, and the chance below which a number of them is too large.
 const ALARM: f64 = 0.05;
-const IMPROBABLE: f64 = 0.01;
+pub(super) const IMPROBABLE: f64 = 0.01;
 
 /// What a wall came to.
 struct Wall {
@@ -95,7 +95,7 @@ pub(super) fn figures(
             PART,
             "still walls on which a stone is called moved",
             alarms as f64,
-            most_alarms(still.len()) as f64,
+            most_alarms(still.len(), IMPROBABLE) as f64,
         )
         .with(format!("of {} still walls; the verdict allows 5 %", still.len())),
     );
@@ -131,13 +131,13 @@ fn pooled(walls: &[Wall], of: impl Fn(&Wall) -> Option<f64>) -> Option<f64> {
     (stones > 0.0).then_some(sum / stones)
 }
 
-/// The largest number of alarms that is not improbable on this many still walls.
-fn most_alarms(walls: usize) -> usize {
+/// The largest number of alarms on this many still walls that is exceeded with at least the probability `improbable`.
+pub(super) fn most_alarms(walls: usize, improbable: f64) -> usize {
     let n = walls as f64;
     let mut chance = (1.0 - ALARM).powf(n);
     let mut below = chance;
     let mut most = 0;
-    while 1.0 - below >= IMPROBABLE && most < walls {
+    while 1.0 - below >= improbable && most < walls {
         chance *= (n - most as f64) / (most as f64 + 1.0) * ALARM / (1.0 - ALARM);
         most += 1;
         below += chance;
@@ -177,8 +177,6 @@ fn measured(
 
 /// A terrestrial survey of a small wall that stands still or bulges by 10 mm.
 fn survey(seed: u64, is_still: bool) -> SurveyParams {
-    let dam = SurveyParams::dam(SIZE_M);
-    let side = |size_m: f64| ((size_m + 1.2) / PIXEL_M) as u32;
     let bulge = WallMotion::Bulge {
         centre_m: [0.0, 0.5 * SIZE_M[1]],
         depth_m: 0.01,
@@ -198,17 +196,23 @@ fn survey(seed: u64, is_still: bool) -> SurveyParams {
             uav: None,
             ..SceneParams::default()
         },
-        photos: PhotoParams {
-            columns: 4,
-            rows: 2,
-            width: side(SIZE_M[0]),
-            height: side(SIZE_M[1]),
-            rendered: false,
-            ..dam.photos.clone()
-        },
-        ..dam
+        photos: photos(4),
+        ..SurveyParams::dam(SIZE_M)
     };
     params.seeded(seed)
+}
+
+/// Two rows of photos that show where the stones of such a wall are, and nothing else.
+pub(super) fn photos(columns: u32) -> PhotoParams {
+    let side = |size_m: f64| ((size_m + 1.2) / PIXEL_M) as u32;
+    PhotoParams {
+        columns,
+        rows: 2,
+        width: side(SIZE_M[0]),
+        height: side(SIZE_M[1]),
+        rendered: false,
+        ..SurveyParams::dam(SIZE_M).photos
+    }
 }
 
 #[cfg(test)]
@@ -218,6 +222,6 @@ mod tests {
     #[test]
     fn alarms_are_too_many_by_the_binomial_distribution() {
         // P(more than 1 of 3) = 3 * 0.05^2 * 0.95 + 0.05^3 = 0.007; P(more than 4 of 20) = 0.0026, more than 3 0.016.
-        assert_eq!((most_alarms(1), most_alarms(3), most_alarms(20)), (1, 1, 4));
+        assert_eq!([1, 3, 20].map(|walls| most_alarms(walls, IMPROBABLE)), [1, 1, 4]);
     }
 }

@@ -132,7 +132,7 @@ fn survey(
 }
 
 /// The project of a simulated survey, with what the plan states about its errors.
-fn project(plan: &SurveyPlan, folder: &Path) -> Result<Project> {
+pub(super) fn project(plan: &SurveyPlan, folder: &Path) -> Result<Project> {
     let mut project = Project::read(&folder.join("stonewise.toml"))?;
     let registration = &mut project.settings.registration;
     registration.photos.enabled = plan.photos.is_some();
@@ -155,7 +155,8 @@ fn project(plan: &SurveyPlan, folder: &Path) -> Result<Project> {
     Ok(project)
 }
 
-fn simulation(plan: &SurveyPlan, seed: u64) -> SurveyParams {
+/// The survey that a plan describes, of a wall that stands still.
+pub(super) fn simulation(plan: &SurveyPlan, seed: u64) -> SurveyParams {
     let stations = TlsParams {
         registration_m: plan.registration.shift_m,
         registration_rad: plan.registration.rotation_rad,

@@ -14,7 +14,7 @@ pub static INSTRUMENTS: Step = Step {
     name: "instruments",
     needs: &[Need::all(&MEASURE)],
     wanted: |until| until >= Until::Registered,
-    applies: |project, _| !project.instruments.is_empty(),
+    applies: |project, _| project.instrument_files().next().is_some(),
     make: |run, _| write_instruments(run),
     ..Step::PLAIN
 };

@@ -8,6 +8,7 @@ pub mod crs;
 mod edits;
 pub mod evidence;
 pub mod face_cloud;
+pub mod influence;
 pub mod instruments;
 pub mod m3c2;
 pub mod m3c2_recipes;

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::files::{relative, resolved, write_readable_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::graph::{Need, Run, Step};
-use crate::pipeline::outputs::verdict::VERDICT;
+use crate::pipeline::outputs::influence::INFLUENCE;
 use crate::pipeline::steps::segment::VotingPhoto;
 use crate::pipeline::until::Until;
 use crate::processor_class;
@@ -23,7 +23,7 @@ use stonewise_io::cloud::{Created, cloud_date};
 /// Writes `run.json`, once all its contents are known.
 pub static RECORD: Step = Step {
     name: "record",
-    needs: &[Need::same(&VERDICT)],
+    needs: &[Need::same(&INFLUENCE)],
     wanted: |until| until >= Until::Registered,
     make: |run, _| write_run_record(run),
     ..Step::PLAIN
@@ -69,9 +69,8 @@ fn write_run_record(run: &Run) -> Result<()> {
             .map(|file| input(context, &file.path))
             .transpose()?,
         instruments: project
-            .instruments
-            .iter()
-            .map(|file| input(context, &file.path))
+            .instrument_files()
+            .map(|file| input(context, file))
             .collect::<Result<_>>()?,
         parameters: project.settings.clone(),
         steps: context.times(),

@@ -10,7 +10,7 @@ use crate::pipeline::steps::change::CHANGE;
 use crate::pipeline::until::Until;
 use crate::results::names::{TRENDS as TRENDS_FILE, VERDICT as FILE};
 use crate::results::records::{EpochVerdict, TrendsRecord, Verdict};
-use crate::results::{ResultSet, read_courses};
+use crate::results::{ResultSet, StoneRow, read_courses};
 use crate::settings::Settings;
 use crate::verdict::{Course, Pair, is_doubted, series_verdict, verdict_on};
 use crate::warnings::Warning;
@@ -39,6 +39,16 @@ impl Run<'_> {
 }
 
 fn write_verdict(context: &Context) -> Result<Verdict> {
+    let verdict = verdict_of_project(context, &|_, _| ())?;
+    write_readable_json(&context.out.join(FILE), &verdict)?;
+    Ok(verdict)
+}
+
+/// The verdict on the tables of a run, with the stones of each pair changed.
+pub(super) fn verdict_of_project(
+    context: &Context,
+    change: &dyn Fn(usize, &mut [StoneRow]),
+) -> Result<Verdict> {
     let project = context.project;
     let epochs: Vec<(&str, Option<&str>)> = project
         .epochs
@@ -46,25 +56,18 @@ fn write_verdict(context: &Context) -> Result<Verdict> {
         .map(|e| (e.name.as_str(), e.date.as_deref()))
         .collect();
     let warnings = context.warnings.sorted();
-    let verdict = verdict_of_tables(
-        &context.out,
-        &epochs,
-        &warnings,
-        &project.settings,
-        context.progress,
-    )?;
-    write_readable_json(&context.out.join(FILE), &verdict)?;
-    Ok(verdict)
+    let (out, settings) = (&context.out, &project.settings);
+    verdict_of_tables(out, &epochs, &warnings, settings, (context.progress, change))
 }
 
 /// The verdict that the tables in a folder give. `epochs`: names and dates of all, the reference first;
-/// `warnings`: those of the run.
+/// `warnings`: those of the run; `change`: what to do before to the stones of each pair.
 pub(crate) fn verdict_of_tables(
     folder: &Path,
     epochs: &[(&str, Option<&str>)],
     warnings: &[Warning],
     settings: &Settings,
-    progress: &dyn Progress,
+    (progress, change): (&dyn Progress, &dyn Fn(usize, &mut [StoneRow])),
 ) -> Result<Verdict> {
     let (thresholds, language) = (&settings.thresholds, settings.report.language);
     let trends: Option<TrendsRecord> = match epochs.len() > 2 {
@@ -79,7 +82,8 @@ pub(crate) fn verdict_of_tables(
     let reference = epochs.first().map_or("", |(name, _)| *name);
     let on_epoch = |(number, epoch): (usize, &str)| -> Result<EpochVerdict> {
         progress.check()?;
-        let results = ResultSet::read_measured(folder, number)?;
+        let mut results = ResultSet::read_measured(folder, number)?;
+        change(number, &mut results.stones);
         let pair = Pair {
             epochs: [reference, epoch],
             in_doubt: is_doubted(warnings, epoch, course.later()),

@@ -1,6 +1,6 @@
 //! The rows of the stones of a later epoch.
 
-use super::instruments::{Before, compare};
+use super::instruments::{Before, InUse, compare};
 use crate::error::Result;
 use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::outputs::outlines::OUTLINES;
@@ -31,6 +31,10 @@ pub struct Measured {
     pub rows: Vec<StoneRow>,
     /// Other instruments beside the stones; `None` where the project names none.
     pub instruments: Option<InstrumentsEpoch>,
+    /// Those that are observations of the datum, where there are any.
+    pub in_use: Option<InUse>,
+    /// Whether errors that sources or stable areas show are taken off the motions.
+    pub is_estimated: bool,
 }
 
 /// The rigid part of the registration error that sources or stable areas show; zero where they show none.
@@ -56,17 +60,21 @@ impl Run<'_> {
             let facade = &self.outlined()?.facade;
             let rows = stone_rows(labelled, &*self.matched(later)?, &registered, &datum, facade);
             let (mut datum, mut rows) = (datum, rows);
+            let is_estimated = datum.is_estimated();
             let before = Before {
                 taken_off: taken_off(&datum, &registered),
                 datum: &mut datum,
                 rows: &mut rows,
             };
             let normals = first.stones.iter().map(|s| (s.id, s.normal)).collect();
-            let instruments = compare(self.context.project, later, before, &normals);
+            let compared = compare(self.context.project, later, before, &normals)?;
+            let (instruments, in_use) = compared.unzip();
             Ok(Measured {
                 datum,
                 rows,
                 instruments,
+                in_use: in_use.flatten(),
+                is_estimated,
             })
         })
     }

@@ -16,7 +16,7 @@ mod problem;
 mod solve;
 mod subgraph;
 #[cfg(test)]
-mod testing;
+pub(super) mod testing;
 mod ties;
 mod variance_components;
 
@@ -25,15 +25,13 @@ pub(crate) use component_estimate::most_likely_components;
 pub(crate) use cracks::Crack;
 pub(crate) use cracks::find_crack;
 pub(crate) use creep::{LeftOver, creeping_zone};
-#[cfg(test)]
-pub(crate) use field_vector::Vector9;
-pub(crate) use field_vector::{FieldVector, Matrix9, stone_from_field};
+pub(crate) use field_vector::{FieldVector, Matrix9, Vector9, stone_from_field};
 pub(crate) use graph::{Edge, Graph, Node, Place};
 pub(crate) use loose_prior::{LoosePrior, estimated_share};
 pub(crate) use mixture::{log_odds_of_loose, probabilities_with_field};
 pub(crate) use motion_prior::MotionPrior;
 pub(crate) use posterior::{Posterior, Prediction, covariance_against, posterior};
-pub(crate) use prior::{Tie, of_tie};
+pub(crate) use prior::{Least, Tie, of_tie, prior};
 pub(crate) use problem::{FieldProblem, FieldStone, PhotoTerms};
 pub(crate) use solve::{Field, information, solve};
 pub(crate) use subgraph::{Displacement, Subgraph};

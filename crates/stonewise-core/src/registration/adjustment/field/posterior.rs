@@ -28,16 +28,10 @@ pub(crate) struct Posterior {
     pub covariance: Matrix6<f64>,
     /// Log probability of the stone's observations.
     pub log_evidence: f64,
-    /// Squared standardised difference between the stone's observations and the prediction, and its degrees
-    /// of freedom.
-    pub misfit: (f64, usize),
     /// Effective degrees of freedom: how many unknowns the stone's own observations determine, 0 to 6.
     pub effective_freedom: f64,
 }
 
-/// Share of a direction's prior variance that the observations must explain for it to enter the misfit.
-/// Directions that they show less (rotation in a smooth face) would only add degrees of freedom and hide a misfit.
-const INFORMED: f64 = 0.1;
 /// Relative and absolute ridge on the own variances (m^2, rad^2): keeps the spread positive definite
 /// to double precision where the field's covariance has rounding errors, far below any variance that counts.
 const RIDGE: [f64; 2] = [1e-9, 1e-18];
@@ -52,7 +46,7 @@ pub(crate) fn posterior(equations: &NormalEquations, prediction: &Prediction, ow
     let mut step = Vector6::zeros();
     let mut covariance = Matrix6::zeros();
     let at_mean = equations.vector.dot(&mean) - 0.5 * mean.dot(&(equations.information * mean));
-    let (mut log_evidence, mut misfit, mut freedom) = (equations.constant + at_mean, 0.0, 0);
+    let mut log_evidence = equations.constant + at_mean;
 
     for k in 0..6 {
         let g = eigen.eigenvalues[k].max(0.0);
@@ -61,10 +55,6 @@ pub(crate) fn posterior(equations: &NormalEquations, prediction: &Prediction, ow
         step += direction * (s / (1.0 + g));
         covariance += direction * direction.transpose() / (1.0 + g);
         log_evidence += 0.5 * (s * s / (1.0 + g) - (1.0 + g).ln());
-        if g > INFORMED {
-            misfit += s * s / (g * (1.0 + g));
-            freedom += 1;
-        }
     }
 
     let explained = eigen.eigenvalues.iter().map(|g| g.max(0.0) / (1.0 + g.max(0.0)));
@@ -72,7 +62,6 @@ pub(crate) fn posterior(equations: &NormalEquations, prediction: &Prediction, ow
         mean: (mean + root * step).into(),
         covariance: root * covariance * root.transpose(),
         log_evidence,
-        misfit: (misfit, freedom),
         effective_freedom: explained.sum(),
     }
 }
@@ -182,17 +171,12 @@ mod tests {
         let expected = covariance * (equations.vector + precision * mean);
         assert!((found.mean.unknowns() - expected).norm() < 1e-7 * expected.norm());
         assert!((found.covariance - covariance).norm() < 1e-6 * covariance.norm());
-        // The trace of the resolution matrix, and the chi-square of the difference with its covariance.
+        // The trace of the resolution matrix.
         let resolution = (covariance * information).trace();
         assert!(
             (found.effective_freedom - resolution).abs() < 1e-6,
             "{resolution}"
         );
-        let observed = information.try_inverse().unwrap();
-        let difference = observed * equations.vector - mean;
-        let chi_square = difference.dot(&((observed + before).try_inverse().unwrap() * difference));
-        assert_eq!(found.misfit.1, 6);
-        assert!((found.misfit.0 / chi_square - 1.0).abs() < 1e-6, "{chi_square}");
         let b = equations.vector;
         let at_mean = b.dot(&mean) - 0.5 * mean.dot(&(information * mean));
         let pull = b - information * mean;

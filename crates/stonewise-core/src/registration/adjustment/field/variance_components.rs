@@ -1,5 +1,6 @@
 //! The variance components of the adjustment.
 
+use crate::registration::random::Random;
 use serde::{Deserialize, Serialize};
 
 /// How unlike neighbouring stones may move: standard deviations, estimated from the survey itself.
@@ -55,6 +56,26 @@ impl VarianceComponents {
             error_m: 5e-4,
             own_rad: 2e-3,
             appearance_m: None,
+        }
+    }
+
+    /// Components drawn from what is assumed of them: own motions by the laws of [`Self::penalty`]; drift and strain, of
+    /// which only bounds are assumed, with even logarithms between the lower bound and the start.
+    pub(crate) fn drawn(random: &mut Random) -> Self {
+        let start = Self::start();
+        let mut even = |k: usize, most: f64| {
+            let least: f64 = BOUNDS[k][0];
+            least * (most / least).powf(random.uniform())
+        };
+        let drift = [even(0, start.drift[0]), even(1, start.drift[1])];
+        let strain = [even(2, start.strain[0]), even(3, start.strain[1])];
+        let mut exponential = |rare: f64| -2.0 * rare / RATE * (1.0 - random.uniform()).ln();
+        Self {
+            drift,
+            strain,
+            own_m: exponential(RARE_M),
+            own_rad: exponential(RARE_RAD),
+            ..start
         }
     }
 

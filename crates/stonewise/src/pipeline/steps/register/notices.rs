@@ -111,7 +111,7 @@ fn report_datum(context: &Context, later: EpochId, registered: &Registered) {
 }
 
 /// A stable area as a sentence names it: those of the project first, then those off the wall.
-fn name_of(context: &Context, registered: &Registered, area: usize) -> Said {
+pub fn name_of(context: &Context, registered: &Registered, area: usize) -> Said {
     let stable = &context.project.settings.registration.stable;
     if let Some(named) = stable.get(area) {
         return named.said(area + 1);
