@@ -2,12 +2,14 @@
 
 use std::convert::Infallible;
 use std::io::ErrorKind;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use stonewise_core::change::CompareError;
 use stonewise_core::progress::Interrupted;
 use stonewise_core::registration::AdjustError;
 use stonewise_core::transfer::TransferError;
 use stonewise_segment::tiling::TilingError;
+use toml::de::{DeTable, DeValue};
 
 /// Why a run, or a step of it, could not be done.
 #[derive(Debug, thiserror::Error)]
@@ -292,6 +294,25 @@ impl Error {
     /// The message of the TOML parser in one line.
     pub fn toml_message(error: &toml::de::Error) -> String {
         error.message().trim().replace('\n', "; ")
+    }
+
+    /// Where a value stands in a TOML text, in bytes, or else the innermost table that is there. `key`: keys,
+    /// and numbers in lists, between dots.
+    pub fn place_in_toml(text: &str, key: &str) -> Range<usize> {
+        let Ok(document) = DeTable::parse(text) else {
+            return 0..0;
+        };
+        let root = DeValue::Table(document.into_inner());
+        let (mut place, mut value) = (0..0, &root);
+        for key in key.split('.') {
+            let inner = match key.parse::<usize>() {
+                Ok(number) => value.get(number),
+                Err(_) => value.get(key),
+            };
+            let Some(inner) = inner else { break };
+            (place, value) = (inner.span(), inner.get_ref());
+        }
+        place
     }
 
     /// What is wrong at a place of a file's text, counted in bytes.

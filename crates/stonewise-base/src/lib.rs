@@ -11,6 +11,7 @@ pub mod messages;
 mod parameters;
 pub mod part;
 pub mod processor;
+pub mod profile;
 pub mod report_params;
 pub mod settings;
 pub mod stable;

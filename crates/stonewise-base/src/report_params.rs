@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// What the first page of the report shows beside the results.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReportParams {
     /// Who measured. Default: nothing is shown.
@@ -15,6 +15,10 @@ pub struct ReportParams {
     /// With which instruments. Default: nothing is shown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instruments: Option<String>,
+    /// Calibration or field test of the scanner, such as the record of its test by ISO 17123-9. Default: nothing is
+    /// shown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<String>,
     /// Number of the report in the operator's or the authority's files. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference_number: Option<String>,
@@ -23,6 +27,22 @@ pub struct ReportParams {
     pub logo: Option<PathBuf>,
     /// Language of the verdict and of the first page.
     pub language: Language,
+    /// Order of the chapters, and their words: `plain`, `din19700`, or a profile of one's own, a file.
+    pub profile: PathBuf,
+}
+
+impl Default for ReportParams {
+    fn default() -> Self {
+        Self {
+            operator: None,
+            instruments: None,
+            calibration: None,
+            reference_number: None,
+            logo: None,
+            language: Language::default(),
+            profile: "plain".into(),
+        }
+    }
 }
 
 /// Largest logo, bytes: it is part of every report.

@@ -18,6 +18,7 @@ use stonewise_base::error::{Error, Result};
 use stonewise_base::files::read_parameters;
 use stonewise_base::messages::Said;
 use stonewise_base::messages::notices::{EPOCH_WITHOUT_DATE, EPOCHS_NUMBERED};
+use stonewise_base::profile::Profile;
 use stonewise_base::report_params::{ReportParams, logo_type};
 use stonewise_base::settings::{IngestParams, RegistrationParams, SegmentParams, Settings};
 use stonewise_base::thresholds::Thresholds;
@@ -34,7 +35,6 @@ use stonewise_io::network::read_network;
 use stonewise_io::text::as_stored;
 use stonewise_segment::Weights;
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
 use toml::value::Datetime;
 
 /// What to do about backslashes.
@@ -389,20 +389,7 @@ impl Source<'_> {
 
     /// Where a value stands, or else the innermost table that is there. `path`: keys, and numbers in arrays.
     fn place(&self, path: &str) -> Range<usize> {
-        let Ok(document) = DeTable::parse(self.text) else {
-            return 0..0;
-        };
-        let root = DeValue::Table(document.into_inner());
-        let (mut place, mut value) = (0..0, &root);
-        for key in path.split('.') {
-            let inner = match key.parse::<usize>() {
-                Ok(number) => value.get(number),
-                Err(_) => value.get(key),
-            };
-            let Some(inner) = inner else { break };
-            (place, value) = (inner.span(), inner.get_ref());
-        }
-        place
+        Error::place_in_toml(self.text, path)
     }
 
     fn map_frame(&self, header: &RawHeader) -> Result<MapFrame> {
@@ -604,7 +591,7 @@ impl Source<'_> {
         }
     }
 
-    /// The logo, like all paths, is relative to the project file.
+    /// Logo and profile, like all paths, are relative to the project file.
     fn report(&self, mut params: ReportParams) -> Result<ReportParams> {
         if let Some(logo) = params.logo {
             let place = self.place("report.logo");
@@ -613,6 +600,16 @@ impl Source<'_> {
                 return Err(self.error(place, format!("logo: {reason}")));
             }
             params.logo = Some(path);
+        }
+        if Profile::shipped(&params.profile).is_none() {
+            let place = self.place("report.profile");
+            let path = self.existing(Spanned::new(place.clone(), params.profile));
+            let names = Profile::names();
+            params.profile = path.map_err(|error| {
+                let fix = format!("{error}; or name a profile of the program: {names}");
+                self.error(place, fix)
+            })?;
+            Profile::read(&params.profile)?;
         }
         Ok(params)
     }

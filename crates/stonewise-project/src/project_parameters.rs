@@ -4,6 +4,7 @@ use crate::Project;
 use serde_json::{Map, Value};
 use std::path::Path;
 use stonewise_base::error::{Error, Result};
+use stonewise_base::profile::Profile;
 use stonewise_base::report_params::logo_type;
 use stonewise_segment::Weights;
 
@@ -38,6 +39,11 @@ impl Project {
             if let Err(reason) = logo_type(logo) {
                 return Err(Error::Parameters(format!("report.logo: {reason}")));
             }
+        }
+        let profile = &mut self.settings.report.profile;
+        if *profile != before.report.profile && Profile::shipped(profile).is_none() {
+            *profile = folder.join(&*profile);
+            Profile::read(profile)?;
         }
         Ok(self)
     }

@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use stonewise_base::error::{Error, Result};
 use stonewise_base::messages::Said;
 use stonewise_base::part::Part;
+use stonewise_base::profile::Profile;
 use stonewise_base::settings::{Align, Settings};
 use stonewise_core::change::M3c2Params;
 use stonewise_core::epoch::{EpochId, Epochs};
@@ -196,6 +197,8 @@ impl Project {
             inputs.push(file);
         }
         inputs.extend(self.settings.report.logo.clone());
+        let profile = &self.settings.report.profile;
+        inputs.extend(Profile::shipped(profile).is_none().then(|| profile.clone()));
         inputs.extend(self.edits.as_ref().map(|edits| edits.path.clone()));
         inputs.extend(self.conditions.as_ref().map(|file| file.path.clone()));
         inputs.extend(self.instrument_files().map(Path::to_path_buf));

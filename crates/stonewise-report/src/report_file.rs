@@ -56,12 +56,13 @@ mod tests {
     use serde_json::Value;
     use std::collections::BTreeSet;
     use stonewise_base::files::write_json;
+    use stonewise_base::profile::{Chapter, Profile};
     use stonewise_base::report_params::{Language, ReportParams};
     use stonewise_base::thresholds::Thresholds;
     use stonewise_base::warnings::Warning;
     use stonewise_core::evaluate::{Evaluation, EvaluationParams, score_motions};
     use stonewise_core::series::SeriesAnswers;
-    use stonewise_results::names::{REMARKS, RUN, TRENDS, VERDICT};
+    use stonewise_results::names::{PROFILE, REMARKS, RUN, TRENDS, VERDICT};
     use stonewise_results::records::{
         Datum, EpochVerdict, EstimateRecord, EstimatorRecord, PathPoint, RegistrationRecord, Remark, Remarks,
         RunRecord, SeriesVerdict, Signature, StepTime, TRENDS_VERSION, Timestamp, TrendsRecord, Verdict,
@@ -103,10 +104,13 @@ mod tests {
         html
     }
 
-    /// The page without the embedded program and its style, whose texts are not the report's.
+    /// The page without the embedded program and its style, whose texts are not the report's, and without the key
+    /// that begins like an infinite number.
     fn written(html: &str) -> String {
         use crate::page::{SCRIPT, STYLE};
-        html.replace(SCRIPT, "").replace(STYLE, "")
+        html.replace(SCRIPT, "")
+            .replace(STYLE, "")
+            .replace("<dt>influence</dt>", "")
     }
 
     /// Every opened element is closed, in order.
@@ -602,7 +606,8 @@ mod tests {
             write_json(&folder.path().join("data/registration.json"), &registration).unwrap();
             let results = ResultSet::read(folder.path()).unwrap();
             let results = ResultSet::read_pair(folder.path(), results.pairs).unwrap();
-            let facts = Summary::in_texts(&results, texts);
+            let mut facts = Summary::in_texts(&results, texts);
+            facts.profile.chapters.push(Chapter::Accuracy);
             let pages = [Some(page(&results, &facts).unwrap()), yearly(&results, &facts)];
             for html in pages.into_iter().flatten() {
                 let words = unmarked(&html);
@@ -635,15 +640,16 @@ mod tests {
         let params = ReportParams {
             operator: Some("River <Authority>".to_owned()),
             instruments: Some("Scanner X".to_owned()),
+            calibration: Some("tested <2025>".to_owned()),
             reference_number: Some("T-17".to_owned()),
-            logo: None,
-            language: Language::English,
+            ..ReportParams::default()
         };
         let html = settled(&[8, 15], &params);
         assert!(html.contains("Attention: 2 of 20 measured stones moved; the largest motion is 20."));
         for words in [
             "<dt>Reference number</dt><dd>T-17</dd>",
             "River &lt;Authority&gt;",
+            "<dt>Calibration of the scanner</dt><dd>tested &lt;2025&gt;</dd>",
             "temperature 9.5\u{a0}\u{b0}C",
             "<a data-stone=\"15\">Stone 15</a>, 0.80\u{a0}m along, 0.50\u{a0}m up: moved 20.4\u{a0}mm",
             "4 of 24 stones were not measured",
@@ -758,6 +764,78 @@ mod tests {
                 assert!(e != g || is_shared || (name == "dt" && is_key), "{name}: {g}");
             }
         }
+    }
+
+    /// Where the sections of a page are named, in its order.
+    fn ids(html: &str) -> Vec<&str> {
+        let sections = html.split("<section id=\"").skip(1);
+        sections.filter_map(|part| part.split('"').next()).collect()
+    }
+
+    fn with_profile(profile: &str, language: Language) -> ReportParams {
+        ReportParams {
+            profile: profile.into(),
+            language,
+            ..ReportParams::default()
+        }
+    }
+
+    #[test]
+    fn a_profile_sets_the_order_and_the_headings() {
+        let default = settled(&[8, 15], &ReportParams::default());
+        assert_eq!(
+            default,
+            settled(&[8, 15], &with_profile("plain", Language::English))
+        );
+        let plain = "summary maps tables distributions datum checks method audit";
+        assert_eq!(ids(&default).join(" "), plain);
+
+        for (language, part) in [(Language::English, "Part"), (Language::German, "Teil")] {
+            let params = with_profile("din19700", language);
+            let html = settled(&[8, 15], &params);
+            let order = "method datum accuracy summary maps tables distributions checks audit";
+            assert_eq!(ids(&html).join(" "), order);
+            let last = inside(&html, "h2").len() - 1;
+            for (i, heading) in inside(&html, "h2").iter().enumerate() {
+                let letter = if i < 3 { "A" } else { "B" };
+                assert!(
+                    i == last || heading.starts_with(&format!("{part} {letter}: ")),
+                    "{heading}"
+                );
+            }
+            assert!(inside(&html, "nav")[0].starts_with(&format!("{part} A: ")));
+
+            let folder = series(language);
+            let mut run: RunRecord =
+                serde_json::from_slice(&std::fs::read(folder.path().join(RUN)).unwrap()).unwrap();
+            run.parameters.report = params;
+            write_json(&folder.path().join(RUN), &run).unwrap();
+            write_report(folder.path()).unwrap();
+            let yearly = std::fs::read_to_string(folder.path().join("yearly.html")).unwrap();
+            check_nesting(&yearly);
+            let numbers = inside(&yearly, "h2");
+            let numbers: Vec<&str> = numbers.iter().map(|heading| &heading[..3]).collect();
+            assert_eq!(numbers, ["A 1", "B 1", "B 2", "B 3", "B 4", "B 5", "B 6"]);
+        }
+    }
+
+    #[test]
+    fn a_profile_of_ones_own_is_read_from_the_results() {
+        let folder = settled_results(&[], &with_profile("survey/ours.toml", Language::English));
+        let file = folder.path().join("ours.toml");
+        let text = "chapters = [\"checks\"]\nappendix = [\"summary\"]\nyearly = []\n\
+                    [words.en.checks]\nheading = \"What could be wrong\"\n";
+        std::fs::write(&file, text).unwrap();
+        write_json(&folder.path().join(PROFILE), &Profile::read(&file).unwrap()).unwrap();
+        let page = || std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap();
+        let html = page();
+        check_nesting(&html);
+        assert_eq!(ids(&html), ["checks", "summary"]);
+        assert_eq!(inside(&html, "h2"), ["What could be wrong", "Summary"]);
+
+        std::fs::write(folder.path().join(PROFILE), text).unwrap();
+        let message = write_report(folder.path()).unwrap_err().to_string();
+        assert!(message.contains("profile.json"), "{message}");
     }
 
     #[test]

@@ -4,7 +4,8 @@ use crate::texts::Texts;
 use crate::verdict::{Course, Pair, is_doubted, verdict_in};
 use nalgebra::Point2;
 use std::collections::BTreeMap;
-use stonewise_base::report_params::{Language, ReportParams};
+use stonewise_base::profile::Profile;
+use stonewise_base::report_params::ReportParams;
 use stonewise_results::records::{EpochVerdict, StoneVerdict};
 use stonewise_results::{ResultSet, RowMotion, Sorted, Status, StoneRow, component_limit_m, nice_scale_m};
 
@@ -26,6 +27,8 @@ pub(crate) struct Summary<'a> {
     pub moved: Vec<(&'a StoneRow, &'a RowMotion)>,
     /// The verdict on this pair of epochs.
     pub verdict: EpochVerdict,
+    /// Order and words of the report.
+    pub profile: Profile,
     /// What the first page says beside the results.
     pub cover: ReportParams,
     /// Loose ones, largest relative motion first.
@@ -46,12 +49,12 @@ pub(crate) struct Summary<'a> {
 impl<'a> Summary<'a> {
     /// The facts of these results, said in the language of their project.
     pub(crate) fn new(results: &'a ResultSet) -> Self {
-        let run = results.run.as_ref();
-        let language = run.map_or(Language::default(), |r| r.parameters.report.language);
-        Self::in_texts(results, Texts::of(language))
+        let params = report_params(results);
+        Self::in_texts(results, Texts::with(params.language, &profile(results, &params)))
     }
 
     pub(crate) fn in_texts(results: &'a ResultSet, texts: &'static Texts) -> Self {
+        let cover = report_params(results);
         let measured = results.measured();
         let verdict = verdict(results, texts);
         let judged: BTreeMap<u32, &StoneVerdict> = verdict.stones.iter().map(|s| (s.stone_id, s)).collect();
@@ -91,11 +94,8 @@ impl<'a> Summary<'a> {
             components: [0, 1, 2].map(|k| Sorted::new(measured.iter().map(|(_, m)| m.face[k]))),
             component_limit_m: shared_scale_m(results, &measured),
             above_limit: measured.iter().filter(|(_, m)| m.significant).count(),
-            cover: results
-                .run
-                .as_ref()
-                .map(|r| r.parameters.report.clone())
-                .unwrap_or_default(),
+            profile: profile(results, &cover),
+            cover,
             moved,
             measured,
             verdict,
@@ -107,6 +107,18 @@ impl<'a> Summary<'a> {
     pub(crate) fn not_measured(&self) -> usize {
         self.stones - self.measured.len()
     }
+}
+
+fn report_params(results: &ResultSet) -> ReportParams {
+    let run = results.run.as_ref();
+    run.map(|r| r.parameters.report.clone()).unwrap_or_default()
+}
+
+/// One of the program's, the user's that the run kept, or else the plain one.
+fn profile(results: &ResultSet, params: &ReportParams) -> Profile {
+    Profile::shipped(&params.profile)
+        .or_else(|| results.evidence.profile.clone())
+        .unwrap_or_else(Profile::plain)
 }
 
 /// Stones determine the scale; M3C2 distances do where no stone is measured.

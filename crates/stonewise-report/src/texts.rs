@@ -1,9 +1,11 @@
 //! The texts of the verdict and of the report, which `stonewise-base/texts` holds in each language.
 
 use serde::Deserialize;
+use serde_json::Value;
 use std::collections::BTreeMap;
-use std::sync::LazyLock;
+use std::sync::{LazyLock, Mutex, PoisonError};
 pub(crate) use stonewise_base::messages::fill;
+use stonewise_base::profile::Profile;
 use stonewise_base::report_params::Language;
 use stonewise_base::thresholds::Quantity;
 use stonewise_figure::{Axis, count, mm, number, percent};
@@ -29,6 +31,7 @@ pub(crate) struct Texts {
     pub stones: StoneTexts,
     pub maps: MapTexts,
     pub charts: ChartTexts,
+    pub accuracy: AccuracyTexts,
     pub checks: CheckTexts,
     pub influence: InfluenceTexts,
     pub scores: ScoreTexts,
@@ -103,8 +106,8 @@ groups! {
 
     /// The report's first page.
     PageTexts {
-        kind, epochs, date, conditions, reference, operator, instruments, reference_number, not_measured,
-        all_measured, no_thresholds, look_first, nothing_first, look_at_doubt, none_stands_out, stone,
+        kind, epochs, date, conditions, reference, operator, instruments, calibration, reference_number,
+        not_measured, all_measured, no_thresholds, look_first, nothing_first, look_at_doubt, none_stands_out, stone,
         along_up, lost_stone, moved_stone, moved_stone_common, loose_stone, opened_joint, zones, zone, state,
         stones, measured, moved, largest, assessor, signature, signed, signed_others, remarks, wall,
         place_date, tile_measured, tile_moved, tile_moved_common, tile_loose, tile_largest,
@@ -144,6 +147,15 @@ groups! {
         along, up, out, displacement, cross, axis_along, axis_up, axis_out, stones_title, stones, m3c2_title,
         m3c2, out_title, out_note, direction, all_median, all_nmad, below_median, below_nmad, datum,
         datum_below, nmad, nmad_below, estimated, and, known, unknown
+    }
+
+    /// Required and achieved accuracy, and the budget of the largest motion.
+    AccuracyTexts {
+        heading, intro, none_stated, budget, combined, expanded, budget_note;
+        /// Quantity, requirement, achieved: median and 90th percentile, how many stones keep it.
+        columns: [&'static str; 5],
+        /// Source, type, three axes, share.
+        budget_columns: [&'static str; 6],
     }
 
     /// The checks of the run.
@@ -213,8 +225,7 @@ groups! {
     YearlyTexts {
         kind, method, condition, results_note, of, interval, no_zones, not_separable, to_write, prepared,
         files;
-        /// Headings in the order that authorities ask for.
-        headings: [&'static str; 7],
+        headings: YearlyHeadings,
         /// Epoch, date, clouds, photos, points, stones, registration.
         survey: [&'static str; 7],
         /// Stable areas, stated, sources, other instruments, unknown.
@@ -222,6 +233,11 @@ groups! {
         /// Epoch, state, measured, moved, loose, lost, largest motion, largest deformation, detection limit.
         results: [&'static str; 9],
         conclusions: [&'static str; 4],
+    }
+
+    /// Headings of its chapters.
+    YearlyHeadings {
+        survey, conditions, results, prediction, interpretation, conclusion, signature
     }
 }
 
@@ -248,14 +264,35 @@ impl Clauses {
 impl Texts {
     /// The texts of a language.
     pub(crate) fn of(language: Language) -> &'static Self {
-        static TEXTS: LazyLock<[Texts; Language::ALL.len()]> = LazyLock::new(|| {
-            Language::ALL.map(|language| Texts {
-                language,
-                decimal: language.text("language.decimal"),
-                ..language.read("report")
-            })
-        });
+        static TEXTS: LazyLock<[Texts; Language::ALL.len()]> =
+            LazyLock::new(|| Language::ALL.map(|language| language.read::<Texts>("report").within(language)));
         &TEXTS[language as usize]
+    }
+
+    /// The texts of a language with the words of a profile; kept for good, once for each of both.
+    pub(crate) fn with(language: Language, profile: &Profile) -> &'static Self {
+        static KEPT: Mutex<BTreeMap<String, &'static Texts>> = Mutex::new(BTreeMap::new());
+        let Some(words) = profile.words(language) else {
+            return Self::of(language);
+        };
+        let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+        *kept
+            .entry(format!("{} {words}", language.tag()))
+            .or_insert_with(|| {
+                let mut report: Value = language.read("report");
+                replace(&mut report, words);
+                // A profile was checked when it was read.
+                let texts = Self::deserialize(&*Box::leak(Box::new(report))).unwrap_or_default();
+                &*Box::leak(Box::new(texts.within(language)))
+            })
+    }
+
+    fn within(self, language: Language) -> Self {
+        Self {
+            language,
+            decimal: language.text("language.decimal"),
+            ..self
+        }
     }
 
     /// The word for a state.
@@ -329,6 +366,18 @@ impl Texts {
     }
 }
 
+/// Puts words in the places of texts.
+fn replace(texts: &mut Value, words: &Value) {
+    match (texts, words) {
+        (Value::Object(texts), Value::Object(words)) => {
+            for (name, word) in words {
+                replace(texts.entry(name.as_str()).or_insert(Value::Null), word);
+            }
+        }
+        (text, word) => *text = word.clone(),
+    }
+}
+
 /// The text for this number of things, with `{n}` filled in.
 pub(crate) fn counted(texts: Number, n: usize, values: &[(&str, &str)]) -> String {
     let text = fill(texts[usize::from(n != 1)], &[("n", &count(n))]);
@@ -338,7 +387,6 @@ pub(crate) fn counted(texts: Number, n: usize, values: &[(&str, &str)]) -> Strin
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::Value;
 
     #[test]
     fn every_file_has_the_texts_and_no_others() {

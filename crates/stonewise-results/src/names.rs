@@ -56,6 +56,8 @@ pub const REPORT_DIR: &str = "data/report";
 pub const YEARLY: &str = "yearly.html";
 /// Folder of the excerpts that the report shows.
 pub const EVIDENCE_DIR: &str = "data/evidence";
+/// The profile of the report, where it is a file of the user's.
+pub const PROFILE: &str = "data/evidence/profile.json";
 /// Folder of the steps' files.
 pub const WORK_DIR: &str = "work";
 

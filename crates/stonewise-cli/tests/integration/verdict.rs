@@ -204,6 +204,10 @@ fn impossible_thresholds_and_logos_are_named_with_their_line() {
         ("[report]\nlogo = \"none.png\"", "no such file or folder"),
         ("[report]\nlogo = \"stonewise.toml\"", "is neither .png nor .jpg"),
         ("[report]\nlanguage = \"it\"", "unknown variant `it`"),
+        (
+            "[report]\nprofile = \"din1970\"",
+            "or name a profile of the program: plain, din19700",
+        ),
     ] {
         let dir = survey_with(lines);
         let out = tempfile::tempdir().unwrap();

@@ -68,6 +68,7 @@ pub(super) fn letter(facts: &Summary) -> String {
         (page.reference_number, &facts.cover.reference_number),
         (page.operator, &facts.cover.operator),
         (page.instruments, &facts.cover.instruments),
+        (page.calibration, &facts.cover.calibration),
     ];
     let items: String = given
         .iter()

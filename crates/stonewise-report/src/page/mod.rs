@@ -1,5 +1,6 @@
 //! The page: what it says, in order.
 
+mod accuracy;
 mod audit;
 mod block;
 mod checks;
@@ -32,6 +33,7 @@ use document::{PATTERNS, footer, head, title};
 use pair::{epoch_names, known_translation_mm};
 use std::fmt::Write;
 use stonewise_base::error::Error;
+use stonewise_base::profile::Chapter;
 use stonewise_base::report_params::Language;
 use stonewise_figure::escape;
 use stonewise_results::names::{PairFile, YEARLY};
@@ -41,22 +43,23 @@ use stonewise_results::{Comparison, Joint, ResultSet, compare, joints};
 #[cfg(test)]
 pub(super) use explorer::{SCRIPT, STYLE};
 
-/// Sections in the order of the page.
-fn sections(texts: &Texts) -> [(&'static str, &'static str); 11] {
+/// What the bar calls a chapter.
+fn title_of(chapter: Chapter, texts: &Texts) -> &'static str {
     let names = &texts.sections;
-    [
-        ("summary", texts.page.summary),
-        ("series", texts.series.heading),
-        ("maps", names.maps),
-        ("tables", names.tables),
-        ("distributions", names.distributions),
-        ("datum", names.datum),
-        ("instruments", texts.instruments.heading),
-        ("checks", texts.checks.heading),
-        ("evaluation", names.evaluation),
-        ("method", names.method),
-        ("audit", names.audit),
-    ]
+    match chapter {
+        Chapter::Summary => texts.page.summary,
+        Chapter::Series => texts.series.heading,
+        Chapter::Maps => names.maps,
+        Chapter::Tables => names.tables,
+        Chapter::Distributions => names.distributions,
+        Chapter::Datum => names.datum,
+        Chapter::Accuracy => texts.accuracy.heading,
+        Chapter::Instruments => texts.instruments.heading,
+        Chapter::Checks => texts.checks.heading,
+        Chapter::Evaluation => names.evaluation,
+        Chapter::Method => names.method,
+        Chapter::Audit => names.audit,
+    }
 }
 
 /// The whole report as one HTML document. The same results give the same bytes.
@@ -69,10 +72,10 @@ fn sections(texts: &Texts) -> [(&'static str, &'static str); 11] {
 pub(super) fn page(results: &ResultSet, facts: &Summary) -> Result<String, Error> {
     let (compared, joints) = (compare(results), joints(results));
     let content = content(results, facts, &compared, &joints, true);
-    let present = sections(facts.texts)
-        .into_iter()
-        .filter(|(id, _)| content.contains(&format!("<section id=\"{id}\">")));
-    let links: String = present
+    let chapters = facts.profile.chapters.iter().chain(&facts.profile.appendix);
+    let links: String = chapters
+        .map(|chapter| (chapter.name(), title_of(*chapter, facts.texts)))
+        .filter(|(id, _)| content.contains(&format!("<section id=\"{id}\">")))
         .map(|(id, name)| format!("<a href=\"#{id}\">{name}</a>"))
         .collect();
     let data = if results.stones.is_empty() {
@@ -125,7 +128,7 @@ pub(super) fn printed(all: &[&ResultSet], appendix: bool) -> String {
     format!("{head}<body>{PATTERNS}{body}</body></html>\n")
 }
 
-/// The sections in order; the last one can be left out.
+/// The chapters in the order of the profile; the appendix can be left out.
 fn content(
     results: &ResultSet,
     facts: &Summary,
@@ -133,35 +136,34 @@ fn content(
     joints: &[Joint],
     appendix: bool,
 ) -> String {
-    let mut body = String::new();
-    body.push_str(&overview::summary(results, facts));
-    body.push_str(&series::series(results, facts));
-
-    if !results.stones.is_empty() {
-        body.push_str(&maps::maps(results, facts, joints));
-        body.push_str(&overview::tables(results, facts));
-    }
-
-    if !facts.measured.is_empty() {
-        body.push_str(&distributions::distributions(
-            results,
-            facts,
-            compared,
-            known_translation_mm(results),
-        ));
-        body.push_str(&distributions::datum(results, facts));
-    }
-
-    body.push_str(&instruments::instruments(results, facts.texts));
-    body.push_str(&checks::checks(results, facts.texts));
-    if let Some(evaluation) = &results.evaluation {
-        body.push_str(&evaluation::evaluation(evaluation, facts.texts));
-    }
-    body.push_str(&method::method(facts.texts));
-    if appendix {
-        body.push_str(&audit::audit(results, facts.texts));
-    }
-    body
+    let texts = facts.texts;
+    let known_mm = || known_translation_mm(results);
+    let has_stones = !results.stones.is_empty();
+    let is_measured = !facts.measured.is_empty();
+    let chapter = |chapter: &Chapter| match chapter {
+        Chapter::Summary => overview::summary(results, facts),
+        Chapter::Series => series::series(results, facts),
+        Chapter::Maps if has_stones => maps::maps(results, facts, joints),
+        Chapter::Tables if has_stones => overview::tables(results, facts),
+        Chapter::Distributions if is_measured => {
+            distributions::distributions(results, facts, compared, known_mm())
+        }
+        Chapter::Datum if is_measured => distributions::datum(results, facts),
+        Chapter::Accuracy if is_measured => accuracy::accuracy(results, facts),
+        Chapter::Instruments => instruments::instruments(results, texts),
+        Chapter::Checks => checks::checks(results, texts),
+        Chapter::Evaluation => {
+            let evaluation = results.evaluation.as_ref();
+            evaluation.map_or(String::new(), |e| evaluation::evaluation(e, texts))
+        }
+        Chapter::Method => method::method(texts),
+        Chapter::Audit => audit::audit(results, texts),
+        Chapter::Maps | Chapter::Tables | Chapter::Distributions | Chapter::Datum | Chapter::Accuracy => {
+            String::new()
+        }
+    };
+    let last: &[Chapter] = if appendix { &facts.profile.appendix } else { &[] };
+    facts.profile.chapters.iter().chain(last).map(chapter).collect()
 }
 
 /// All that stands above the sections.

@@ -7,6 +7,7 @@ use super::{doubts, instruments, series};
 use crate::summary::Summary;
 use crate::texts::{Texts, YearlyTexts, fill};
 use std::fmt::Write;
+use stonewise_base::profile::YearlyChapter;
 use stonewise_figure::{count, escape};
 use stonewise_results::ResultSet;
 use stonewise_results::records::{DatumState, EpochRecord, EpochVerdict, RunRecord, Verdict};
@@ -19,26 +20,31 @@ pub(crate) fn yearly(newest: &ResultSet, facts: &Summary) -> Option<String> {
     let texts = facts.texts;
     let names = &texts.yearly;
     let version = [("version", &*run.version)];
-    let parts = [
-        format!(
-            "{}{}<p>{}</p>",
-            letter(facts),
-            surveys(run, texts),
-            fill(names.method, &version)
-        ),
-        format!("{}{}", of_epochs(run, texts), series::terms(newest, texts)),
-        results(newest, verdict, facts),
-        format!(
-            "<p>{}</p>{}",
-            with_units(&escape(&answers.sentence)),
-            series::answers(answers, texts)
-        ),
-        interpretation(newest, run, verdict, texts),
-        conclusion(names),
-        place_to_sign(texts),
-    ];
-
-    let body: String = { names.headings.iter().zip(&parts) }
+    let chapter = |chapter: &YearlyChapter| match chapter {
+        YearlyChapter::Survey => {
+            let method = fill(names.method, &version);
+            let what = format!("{}{}<p>{method}</p>", letter(facts), surveys(run, texts));
+            (names.headings.survey, what)
+        }
+        YearlyChapter::Conditions => {
+            let conditions = format!("{}{}", of_epochs(run, texts), series::terms(newest, texts));
+            (names.headings.conditions, conditions)
+        }
+        YearlyChapter::Results => (names.headings.results, results(newest, verdict, facts)),
+        YearlyChapter::Prediction => {
+            let sentence = with_units(&escape(&answers.sentence));
+            let answers = format!("<p>{sentence}</p>{}", series::answers(answers, texts));
+            (names.headings.prediction, answers)
+        }
+        YearlyChapter::Interpretation => {
+            let said = interpretation(newest, run, verdict, texts);
+            (names.headings.interpretation, said)
+        }
+        YearlyChapter::Conclusion => (names.headings.conclusion, conclusion(names)),
+        YearlyChapter::Signature => (names.headings.signature, place_to_sign(texts)),
+    };
+    let chapters = facts.profile.yearly.iter().map(chapter);
+    let body: String = chapters
         .map(|(heading, part)| format!("<section><h2>{heading}</h2>\n{part}</section>\n"))
         .collect();
     let first = run.epochs.first().map_or("", |e| &e.name);

@@ -21,9 +21,11 @@ pub use logo::{Logo, write_logo};
 pub use sections::{Cut, SectionPoint, write_sections};
 pub use tracks::{Tracks, most_pictured, track_side_px, write_tracks};
 
+use crate::names::PROFILE;
 use crops::StoredCrops;
 use std::path::Path;
 use stonewise_base::error::Error;
+use stonewise_base::profile::Profile;
 use tracks::StoredTracks;
 
 /// The excerpts of one pair of epochs; whatever is missing is empty.
@@ -41,6 +43,8 @@ pub struct Evidence {
     pub cameras: [Vec<PosedPhoto>; 2],
     /// The picture of the first page.
     pub logo: Option<Logo>,
+    /// The profile of the report, where it is a file of the user's.
+    pub profile: Option<Profile>,
 }
 
 impl Evidence {
@@ -60,6 +64,7 @@ impl Evidence {
             clouds: [first_cloud?, second_cloud?],
             cameras: [first_cameras?, second_cameras?],
             logo: logo::read_logo(dir)?,
+            profile: Profile::kept(&dir.join(PROFILE))?,
         })
     }
 }

@@ -78,7 +78,7 @@ const BASE: Layers = &[
     &["stable"],
     &["settings"],
     &["address_space", "files", "part", "warnings"],
-    &["parameters"],
+    &["parameters", "profile"],
 ];
 
 const RESULTS: Layers = &[

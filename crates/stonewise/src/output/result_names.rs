@@ -53,7 +53,7 @@ const EXTENSIONS: [&str; 13] = [
     "csv", "parquet", "json", "geojson", "gpkg", "laz", "vtp", "ply", "dxf", "html", "jpg", "png", "b3",
 ];
 /// Excerpts of the survey, without the numbers of epochs and pictures.
-const EVIDENCE: [&str; 8] = [
+const EVIDENCE: [&str; 9] = [
     "crops",
     "crop_outlines",
     "sections",
@@ -62,6 +62,7 @@ const EVIDENCE: [&str; 8] = [
     "cloud",
     "cameras",
     "logo",
+    "profile",
 ];
 
 /// Folders of pictures and tables, in [`DATA_DIR`] and, of earlier versions, beside it.

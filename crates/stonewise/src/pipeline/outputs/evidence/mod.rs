@@ -7,13 +7,16 @@ mod tracks;
 mod window;
 
 use crate::error::{Error, Result};
+use crate::files::write_json;
 use crate::pipeline::graph::{Need, Phase, Run, Step};
 use crate::pipeline::steps::measure::MEASURE;
 use crate::pipeline::until::Until;
 use crate::report_params::logo_type;
+use crate::results::names::PROFILE;
 use crate::results::{PosedPhoto, write_cameras, write_logo, write_sections, write_thin_cloud};
 use crops::{ShownEpoch, write_epoch_crops};
 use sections::sections;
+use stonewise_base::profile::Profile;
 use stonewise_core::epoch::EpochId;
 use thin::thin_cloud;
 pub use tracks::write_tracked_stones;
@@ -69,5 +72,9 @@ fn write_evidence(run: &Run) -> Result<()> {
         write_sections(out, later.number(), &points)?;
     }
 
+    let profile = &context.project.settings.report.profile;
+    if Profile::shipped(profile).is_none() {
+        write_json(&out.join(PROFILE), &Profile::read(profile)?)?;
+    }
     Ok(())
 }
