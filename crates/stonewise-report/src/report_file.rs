@@ -104,13 +104,10 @@ mod tests {
         html
     }
 
-    /// The page without the embedded program and its style, whose texts are not the report's, and without the key
-    /// that begins like an infinite number.
+    /// The page without the embedded program and its style, whose texts are not the report's.
     fn written(html: &str) -> String {
         use crate::page::{SCRIPT, STYLE};
-        html.replace(SCRIPT, "")
-            .replace(STYLE, "")
-            .replace("<dt>influence</dt>", "")
+        html.replace(SCRIPT, "").replace(STYLE, "")
     }
 
     /// Every opened element is closed, in order.

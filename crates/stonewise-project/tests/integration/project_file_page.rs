@@ -62,7 +62,7 @@ fn the_committed_schema_is_that_of_the_types() {
     let committed: Value = serde_json::from_str(&docs("project-file.schema.json")).unwrap();
     assert!(
         committed == project_schema(),
-        "write it again: cargo run -- schema > docs/src/project-file.schema.json"
+        "write it again: cargo run -- self schema > docs/src/project-file.schema.json"
     );
 }
 
