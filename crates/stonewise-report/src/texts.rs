@@ -276,15 +276,17 @@ impl Texts {
             return Self::of(language);
         };
         let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-        *kept
-            .entry(format!("{} {words}", language.tag()))
-            .or_insert_with(|| {
-                let mut report: Value = language.read("report");
-                replace(&mut report, words);
-                // A profile was checked when it was read.
-                let texts = Self::deserialize(&*Box::leak(Box::new(report))).unwrap_or_default();
-                &*Box::leak(Box::new(texts.within(language)))
-            })
+        let key = format!("{} {words}", language.tag());
+        if let Some(texts) = kept.get(&key).copied() {
+            return texts;
+        }
+        let mut report: Value = language.read("report");
+        replace(&mut report, words);
+        // A profile was checked when it was read.
+        let texts = Self::deserialize(&*Box::leak(Box::new(report))).unwrap_or_default();
+        let texts: &'static Self = Box::leak(Box::new(texts.within(language)));
+        kept.insert(key, texts);
+        texts
     }
 
     fn within(self, language: Language) -> Self {

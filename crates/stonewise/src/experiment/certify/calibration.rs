@@ -326,7 +326,11 @@ mod tests {
         let wall = |k: u32| {
             let ranks = vec![[(f64::from(k) + 0.5) / 40.0; 3]; 30];
             Ranks {
-                absolute: if k % 2 == 0 { ranks.clone() } else { Vec::new() },
+                absolute: if k.is_multiple_of(2) {
+                    ranks.clone()
+                } else {
+                    Vec::new()
+                },
                 without_datum: ranks,
                 joints: Vec::new(),
             }

@@ -19,6 +19,9 @@ use std::sync::Arc;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::progress::Progress;
 
+/// What changes the stones of a pair, given its number, before they are judged.
+type Change<'a> = dyn Fn(usize, &mut [StoneRow]) + 'a;
+
 /// Makes the verdict on every later epoch from the tables in the folder, and writes it.
 pub static VERDICT: Step = Step {
     name: "verdict",
@@ -45,10 +48,7 @@ fn write_verdict(context: &Context) -> Result<Verdict> {
 }
 
 /// The verdict on the tables of a run, with the stones of each pair changed.
-pub(super) fn verdict_of_project(
-    context: &Context,
-    change: &dyn Fn(usize, &mut [StoneRow]),
-) -> Result<Verdict> {
+pub(super) fn verdict_of_project(context: &Context, change: &Change) -> Result<Verdict> {
     let project = context.project;
     let epochs: Vec<(&str, Option<&str>)> = project
         .epochs
@@ -67,7 +67,7 @@ pub(crate) fn verdict_of_tables(
     epochs: &[(&str, Option<&str>)],
     warnings: &[Warning],
     settings: &Settings,
-    (progress, change): (&dyn Progress, &dyn Fn(usize, &mut [StoneRow])),
+    (progress, change): (&dyn Progress, &Change),
 ) -> Result<Verdict> {
     let (thresholds, language) = (&settings.thresholds, settings.report.language);
     let trends: Option<TrendsRecord> = match epochs.len() > 2 {
