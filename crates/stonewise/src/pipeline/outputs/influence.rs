@@ -1,18 +1,15 @@
 //! What each source, stable area, instrument and known length does to the results of a later epoch.
 
+use super::tables::write_registration;
 use super::verdict::{VERDICT, verdict_of_project};
 use crate::error::Result;
-use crate::files::write_readable_json;
 use crate::pipeline::graph::{Need, Run, Step};
 use crate::pipeline::steps::measure::Measured;
 use crate::pipeline::steps::register::{length_influences, name_of, since_reference};
 use crate::pipeline::until::Until;
 use crate::report_params::Language;
 use crate::results::StoneRow;
-use crate::results::names::PairFile;
-use crate::results::records::{
-    DeformationRecord, EpochVerdict, InfluenceRecord, Largest, ObserversRecord, RegistrationRecord,
-};
+use crate::results::records::{EpochVerdict, InfluenceRecord, Largest};
 use crate::texts::Said;
 use crate::texts::notices::{KNOWN_LENGTH, LARGEST_BEYOND, RESTS_ON_ONE, STATE_CHANGES};
 use nalgebra::Vector3;
@@ -21,7 +18,7 @@ use stonewise_core::epoch::EpochId;
 use stonewise_core::instruments::RegistrationError;
 use stonewise_core::registration::observers::Member;
 
-/// Writes `registration.json`, with what the results rest on, and notes what the verdict rests on alone.
+/// Adds to `registration.json` what the results rest on, and notes what the verdict rests on alone.
 pub static INFLUENCE: Step = Step {
     name: "influence",
     needs: &[Need::same(&VERDICT)],
@@ -74,21 +71,6 @@ fn write_influence(run: &Run) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Writes what is known about the registration of a later epoch.
-fn write_registration(run: &Run, later: EpochId, influence: Vec<InfluenceRecord>) -> Result<()> {
-    let (registered, measured) = (run.registered(later)?, run.measured(later)?);
-    let record = RegistrationRecord {
-        estimator: registered.estimator.clone(),
-        datum: measured.datum.clone(),
-        observers: registered.epoch_errors.as_ref().map(ObserversRecord::from),
-        deformation: registered.deformation.as_ref().map(DeformationRecord::from),
-        checks: run.check_records(later)?,
-        influence,
-    };
-    let name = PairFile::Registration.place(later.index());
-    write_readable_json(&run.context.out.join(name), &record)
 }
 
 /// What takes part in the datum of a later epoch or in its scale.
