@@ -61,19 +61,19 @@ fn dxf(drawing: &Drawing) -> String {
     let mut out = Groups::default();
     out.section("HEADER");
     out.tag(9, "$ACADVER").tag(1, "AC1009");
-    out.end("ENDSEC");
+    out.tag(0, "ENDSEC");
     out.section("TABLES");
     out.tag(0, "TABLE").tag(2, "LTYPE").tag(70, 1);
     out.tag(0, "LTYPE").tag(2, "CONTINUOUS").tag(70, 0);
     out.tag(3, "Solid line").tag(72, 65).tag(73, 0).tag(40, "0.0");
-    out.end("ENDTAB");
+    out.tag(0, "ENDTAB");
     out.tag(0, "TABLE").tag(2, "LAYER").tag(70, drawing.layers.len());
     for (name, colour) in &drawing.layers {
         out.tag(0, "LAYER").tag(2, name).tag(70, 0);
         out.tag(62, colour).tag(6, "CONTINUOUS");
     }
-    out.end("ENDTAB");
-    out.end("ENDSEC");
+    out.tag(0, "ENDTAB");
+    out.tag(0, "ENDSEC");
     out.section("ENTITIES");
     for shape in drawing.shapes.iter().filter(|shape| shape.is_finite()) {
         match &shape.form {
@@ -97,8 +97,8 @@ fn dxf(drawing: &Drawing) -> String {
             }
         }
     }
-    out.end("ENDSEC");
-    out.end("EOF");
+    out.tag(0, "ENDSEC");
+    out.tag(0, "EOF");
     out.0
 }
 
@@ -131,10 +131,6 @@ impl Groups {
 
     fn section(&mut self, name: &str) {
         self.tag(0, "SECTION").tag(2, name);
-    }
-
-    fn end(&mut self, what: &str) {
-        self.tag(0, what);
     }
 }
 

@@ -603,8 +603,11 @@ mod tests {
             write_json(&folder.path().join("data/registration.json"), &registration).unwrap();
             let results = ResultSet::read(folder.path()).unwrap();
             let results = ResultSet::read_pair(folder.path(), results.pairs).unwrap();
-            let mut facts = Summary::in_texts(&results, texts);
-            facts.profile.chapters.push(Chapter::Accuracy);
+            let Summary {
+                cover, mut profile, ..
+            } = Summary::new(&results);
+            profile.chapters.push(Chapter::Accuracy);
+            let facts = Summary::of(&results, cover, profile, texts);
             let pages = [Some(page(&results, &facts).unwrap()), yearly(&results, &facts)];
             for html in pages.into_iter().flatten() {
                 let words = unmarked(&html);

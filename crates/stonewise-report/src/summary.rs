@@ -47,14 +47,24 @@ pub(crate) struct Summary<'a> {
 }
 
 impl<'a> Summary<'a> {
-    /// The facts of these results, said in the language of their project.
+    /// The facts of these results, said in the language and the words of their project.
     pub(crate) fn new(results: &'a ResultSet) -> Self {
-        let params = report_params(results);
-        Self::in_texts(results, Texts::with(params.language, &profile(results, &params)))
+        let run = results.run.as_ref();
+        let cover = run.map(|r| r.parameters.report.clone()).unwrap_or_default();
+        // One of the program's, the user's that the run kept, or else the plain one.
+        let profile = Profile::shipped(&cover.profile)
+            .or_else(|| results.evidence.profile.clone())
+            .unwrap_or_else(Profile::plain);
+        let texts = Texts::with(cover.language, &profile);
+        Self::of(results, cover, profile, texts)
     }
 
-    pub(crate) fn in_texts(results: &'a ResultSet, texts: &'static Texts) -> Self {
-        let cover = report_params(results);
+    pub(crate) fn of(
+        results: &'a ResultSet,
+        cover: ReportParams,
+        profile: Profile,
+        texts: &'static Texts,
+    ) -> Self {
         let measured = results.measured();
         let verdict = verdict(results, texts);
         let judged: BTreeMap<u32, &StoneVerdict> = verdict.stones.iter().map(|s| (s.stone_id, s)).collect();
@@ -94,7 +104,7 @@ impl<'a> Summary<'a> {
             components: [0, 1, 2].map(|k| Sorted::new(measured.iter().map(|(_, m)| m.face[k]))),
             component_limit_m: shared_scale_m(results, &measured),
             above_limit: measured.iter().filter(|(_, m)| m.significant).count(),
-            profile: profile(results, &cover),
+            profile,
             cover,
             moved,
             measured,
@@ -107,18 +117,6 @@ impl<'a> Summary<'a> {
     pub(crate) fn not_measured(&self) -> usize {
         self.stones - self.measured.len()
     }
-}
-
-fn report_params(results: &ResultSet) -> ReportParams {
-    let run = results.run.as_ref();
-    run.map(|r| r.parameters.report.clone()).unwrap_or_default()
-}
-
-/// One of the program's, the user's that the run kept, or else the plain one.
-fn profile(results: &ResultSet, params: &ReportParams) -> Profile {
-    Profile::shipped(&params.profile)
-        .or_else(|| results.evidence.profile.clone())
-        .unwrap_or_else(Profile::plain)
 }
 
 /// Stones determine the scale; M3C2 distances do where no stone is measured.

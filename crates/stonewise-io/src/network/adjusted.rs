@@ -57,7 +57,7 @@ pub(super) struct Raw {
     pub covariance: DMatrix<f64>,
 }
 
-/// A point as far as a file knows it.
+/// A point as far as a file describes it.
 pub(super) struct RawPoint {
     pub name: String,
     pub line: usize,

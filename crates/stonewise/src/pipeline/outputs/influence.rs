@@ -36,16 +36,15 @@ fn write_influence(run: &Run) -> Result<()> {
         let supports = supports(run, later, &measured)?;
         let largest = on_epoch.wall.largest.as_ref();
         let record = |support: &Support| support.record(&measured, largest, project.settings.report.language);
-        write_registration(run, later, supports.iter().map(record).collect())?;
+        if !supports.is_empty() {
+            write_registration(run, later, supports.iter().map(record).collect())?;
+        }
         all.push((later, on_epoch, measured, supports));
     }
 
     // The verdict without that on which the motions of each epoch depend most.
     let most = |(later, _, _, supports): &(EpochId, _, _, Vec<Support>)| {
-        let most = supports
-            .iter()
-            .max_by(|a, b| a.shift_m().total_cmp(&b.shift_m()))?;
-        Some((later.index(), most.shifts.clone()?))
+        Some((later.index(), most_influential(supports)?.shifts.clone()?))
     };
     let shifts: BTreeMap<usize, BTreeMap<u32, Vector3<f64>>> = all.iter().filter_map(most).collect();
     if shifts
@@ -184,6 +183,11 @@ fn supports(run: &Run, later: EpochId, measured: &Measured) -> Result<Vec<Suppor
     Ok(all)
 }
 
+/// That on which the motions depend most.
+fn most_influential(supports: &[Support]) -> Option<&Support> {
+    supports.iter().max_by(|a, b| a.shift_m().total_cmp(&b.shift_m()))
+}
+
 /// The sentence that names the one thing without which the largest motion would lie outside its interval or the state
 /// would be another; `without`: the verdict without that on which the motions depend most.
 fn rests_on_one(
@@ -208,9 +212,7 @@ fn rests_on_one(
         Some(say(support, LARGEST_BEYOND.say(&values)))
     });
     beyond.or_else(|| {
-        let most = supports
-            .iter()
-            .max_by(|a, b| a.shift_m().total_cmp(&b.shift_m()))?;
+        let most = most_influential(supports)?;
         (without.state != now.state).then(|| say(most, (&STATE_CHANGES).into()))
     })
 }
